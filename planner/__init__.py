@@ -1,0 +1,1 @@
+"""The scan planner: kinematics, configuration maps, planners, streaming and alignment."""

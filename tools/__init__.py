@@ -1,0 +1,1 @@
+"""Command-line tools: tuning, identification, figures and benchmarks."""
