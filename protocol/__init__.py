@@ -1,1 +1,42 @@
 """The wire between a client and the rotary table."""
+
+from protocol.client import TableClient
+from protocol.clock import Clock, WallClock
+from protocol.codec import decode_command, decode_reply, encode_command, encode_reply
+from protocol.errors import (
+    ArrivalTimeout,
+    CommandRefused,
+    PortError,
+    ProtocolMisuse,
+    ReplyTimeout,
+    TableError,
+    UnexpectedReply,
+)
+from protocol.line_buffer import LineBuffer
+from protocol.messages import VERBS, Angle, Command, ErrorCode, Ok, Refusal, Reply, Verb
+
+__all__ = [
+    "VERBS",
+    "Angle",
+    "ArrivalTimeout",
+    "Clock",
+    "Command",
+    "CommandRefused",
+    "ErrorCode",
+    "LineBuffer",
+    "Ok",
+    "PortError",
+    "ProtocolMisuse",
+    "Refusal",
+    "Reply",
+    "ReplyTimeout",
+    "TableClient",
+    "TableError",
+    "UnexpectedReply",
+    "Verb",
+    "WallClock",
+    "decode_command",
+    "decode_reply",
+    "encode_command",
+    "encode_reply",
+]
