@@ -1,0 +1,68 @@
+"""The shape of the whole: imports run one way, and clocks, ports and threads stay at the edge."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+MAY_IMPORT = {
+    "protocol": {"protocol"},
+    "emulator": {"emulator", "protocol"},
+    "planner": {"planner", "protocol"},
+    "tools": {"emulator", "planner", "protocol", "tools"},
+}
+
+EDGE_MODULES = {
+    "asyncio",
+    "datetime",
+    "fcntl",
+    "multiprocessing",
+    "os",
+    "pathlib",
+    "pty",
+    "select",
+    "selectors",
+    "serial",
+    "signal",
+    "socket",
+    "subprocess",
+    "termios",
+    "threading",
+    "time",
+    "tty",
+}
+
+PROTOCOL_EDGE = {
+    "protocol/client.py": {"serial"},
+    "protocol/clock.py": {"time"},
+}
+
+
+def imported_packages(source: Path) -> Iterator[str]:
+    """Yield the top-level name of each import, those inside functions included."""
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield source.relative_to(ROOT).parts[0] if node.level else str(node.module).partition(".")[0]
+
+
+@pytest.mark.parametrize("package", MAY_IMPORT)
+def test_imports_run_one_way(package: str) -> None:
+    forbidden = MAY_IMPORT.keys() - MAY_IMPORT[package]
+    sources = sorted((ROOT / package).rglob("*.py"))
+    assert sources
+    wrong = [(str(source), name) for source in sources for name in imported_packages(source) if name in forbidden]
+    assert wrong == []
+
+
+def test_the_protocol_touches_clock_and_port_at_its_edge_only() -> None:
+    touched = {
+        source.relative_to(ROOT).as_posix(): edge
+        for source in (ROOT / "protocol").glob("*.py")
+        if (edge := EDGE_MODULES.intersection(imported_packages(source)))
+    }
+    assert touched == PROTOCOL_EDGE
