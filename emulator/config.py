@@ -1,0 +1,268 @@
+"""The table's constants: one frozen value per section of the TOML file, each number with its unit and its range.
+
+The numbers themselves, and where each comes from, are in `default.toml`.
+"""
+
+import math
+import tomllib
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any, Self, get_type_hints
+
+DEFAULT_FILE = Path(__file__).with_name("default.toml")
+
+
+class ConfigError(ValueError):
+    """A configuration that cannot be used; the message names the file, the key and what is allowed."""
+
+
+def quantity(*, above: float | None = None, least: float | None = None, most: float | None = None) -> Any:  # noqa: ANN401  # stands for a value of the annotated type
+    """Declare a number that must be > `above`, >= `least` and <= `most`."""
+    return field(metadata={"above": above, "least": least, "most": most})
+
+
+@dataclass(frozen=True)
+class MotorConfig:
+    """The DC motor, from its datasheet."""
+
+    resistance_ohm: float = quantity(above=0)
+    inductance_H: float = quantity(above=0)
+    torque_constant_Nm_A: float = quantity(above=0)
+    rotor_inertia_kg_m2: float = quantity(above=0)
+
+
+@dataclass(frozen=True)
+class DriverConfig:
+    """The PWM bridge."""
+
+    supply_V: float = quantity(above=0)
+    pwm_bits: int = quantity(least=4, most=15)
+
+
+@dataclass(frozen=True)
+class GearsConfig:
+    """The spur gear chain between motor and table."""
+
+    ratio: float = quantity(least=1)
+    efficiency: float = quantity(above=0, most=1)
+    inertia_kg_m2: float = quantity(least=0)
+    backlash_arcmin: float = quantity(least=0, most=600)
+
+
+@dataclass(frozen=True)
+class DiscConfig:
+    """The table's disc with the workpiece on it."""
+
+    inertia_kg_m2: float = quantity(above=0)
+    bearing_friction_Nm: float = quantity(least=0)
+
+
+@dataclass(frozen=True)
+class FrictionConfig:
+    """Friction of motor and gears at the motor's shaft."""
+
+    coulomb_Nm: float = quantity(least=0)
+    stiction_ratio: float = quantity(least=1, most=10)
+    stribeck_speed_rad_s: float = quantity(above=0)
+    viscous_Nm_s: float = quantity(least=0)
+
+
+@dataclass(frozen=True)
+class EncoderConfig:
+    """The quadrature encoder on the motor's shaft."""
+
+    lines: int = quantity(least=1, most=10_000)
+
+
+@dataclass(frozen=True)
+class ControlConfig:
+    """The firmware's clock and speed estimate."""
+
+    tick_hz: int = quantity(least=100, most=100_000)
+    speed_window_ticks: int = quantity(least=1, most=64)
+
+
+@dataclass(frozen=True)
+class GainsConfig:
+    """One PID gain set: u = K (e + integral(e) / Ti - Td d(omega)/dt), e in deg/s, u = 1 at full duty."""
+
+    proportional_duty_s_deg: float = quantity(least=0)
+    integral_time_s: float = quantity(above=0)
+    derivative_time_s: float = quantity(least=0)
+
+
+@dataclass(frozen=True)
+class GainSetsConfig:
+    """The two gain sets of section 2.1 of the paper: following a ramp, and holding a speed."""
+
+    ramp: GainsConfig
+    hold: GainsConfig
+
+
+@dataclass(frozen=True)
+class SettlingConfig:
+    """How the table is brought to its target once the profile has ended."""
+
+    arrival_count: int = quantity(least=0, most=100)
+    approach_rate_1_s: float = quantity(above=0, most=100)
+    approach_speed_deg_s: float = quantity(above=0)
+
+
+@dataclass(frozen=True)
+class ProtectionConfig:
+    """When a motor that does not turn is switched off."""
+
+    stall_duty: float = quantity(above=0, most=1)
+    stall_time_s: float = quantity(above=0)
+    settling_time_s: float = quantity(above=0)
+
+
+@dataclass(frozen=True)
+class MotionConfig:
+    """A speed and an acceleration of the table."""
+
+    speed_deg_s: float = quantity(above=0)
+    acceleration_deg_s2: float = quantity(above=0)
+
+
+@dataclass(frozen=True)
+class SerialConfig:
+    """The serial line."""
+
+    baud: int = quantity(least=0, most=4_000_000)
+    decimals: int = quantity(least=1, most=6)
+    strict: bool = quantity()
+
+
+@dataclass(frozen=True)
+class TableConfig:
+    """Every constant of the table. The file of each default value states its source."""
+
+    motor: MotorConfig
+    driver: DriverConfig
+    gears: GearsConfig
+    table: DiscConfig
+    friction: FrictionConfig
+    encoder: EncoderConfig
+    control: ControlConfig
+    gains: GainSetsConfig
+    settling: SettlingConfig
+    protection: ProtectionConfig
+    limits: MotionConfig
+    power_on: MotionConfig
+    serial: SerialConfig
+
+    @property
+    def counts_per_turn(self) -> float:
+        """Encoder counts in one turn of the table: quadrature counts each line four times."""
+        return 4 * self.encoder.lines * self.gears.ratio
+
+    def with_serial(self, **changes: int | bool | None) -> Self:
+        """Return this table with other serial settings; a setting that is None stays as it is.
+
+        Raises:
+            ConfigError: A setting is outside its range.
+        """
+        serial = self.serial
+        chosen = {key: value for key, value in changes.items() if value is not None}
+        merged = {entry.name: getattr(serial, entry.name) for entry in fields(serial)} | chosen
+        return replace(self, serial=_section(SerialConfig, merged, "serial settings", "serial"))
+
+
+def load_config(path: str | Path | None = None) -> TableConfig:
+    """Read a table's constants: the shipped defaults, with those of the file at `path` over them.
+
+    Raises:
+        ConfigError: The file cannot be read, or a key, a type, a range or a combination is wrong.
+    """
+    defaults = _read(DEFAULT_FILE)
+    source = DEFAULT_FILE.name if path is None else str(path)
+    merged = defaults if path is None else _merged(defaults, _read(Path(path)), source, "")
+    config: TableConfig = _section(TableConfig, merged, source, "")
+    _check_together(config, source)
+    return config
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: is not TOML: {error}") from error
+
+
+def _merged(defaults: dict[str, Any], changes: dict[str, Any], source: str, where: str) -> dict[str, Any]:
+    result = dict(defaults)
+    for key, value in changes.items():
+        if key not in defaults:
+            raise ConfigError(f"{source}: {where + key} is not a key; allowed here are {', '.join(defaults)}")
+        nested = isinstance(defaults[key], dict)
+        if nested and not isinstance(value, dict):
+            raise ConfigError(f"{source}: {where + key} must be a section, not {value!r}")
+        result[key] = _merged(defaults[key], value, source, f"{where}{key}.") if nested else value
+    return result
+
+
+def _section(kind: type[Any], values: dict[str, Any], source: str, where: str) -> Any:  # noqa: ANN401  # an instance of `kind`
+    types = get_type_hints(kind)
+    arguments = {}
+    for entry in fields(kind):
+        name = f"{where}.{entry.name}" if where else entry.name
+        wanted, value = types[entry.name], values[entry.name]
+        if is_dataclass(wanted):
+            arguments[entry.name] = _section(wanted, value, source, name)  # type: ignore[arg-type]  # a dataclass's type
+        else:
+            arguments[entry.name] = _number(wanted, value, entry.metadata, f"{source}: {name}")
+    constructor: Any = kind
+    return constructor(**arguments)
+
+
+def _number(wanted: type, value: object, limits: Any, where: str) -> float | int | bool:  # noqa: ANN401  # a field's metadata
+    if wanted is bool or isinstance(value, bool):
+        if wanted is bool and isinstance(value, bool):
+            return value
+        raise ConfigError(f"{where} is {value!r}; it must be {'true or false' if wanted is bool else 'a number'}")
+    if not isinstance(value, int if wanted is int else (int, float)):
+        raise ConfigError(f"{where} is {value!r}; it must be a {'whole number' if wanted is int else 'number'}")
+    if not math.isfinite(value):
+        raise ConfigError(f"{where} is {value!r}; it must be finite")
+    above, least, most = (limits[key] for key in ("above", "least", "most"))
+    broken = (
+        (above is not None and value <= above, f"greater than {above}"),
+        (least is not None and value < least, f"at least {least}"),
+        (most is not None and value > most, f"at most {most}"),
+    )
+    for is_broken, allowed in broken:
+        if is_broken:
+            raise ConfigError(f"{where} is {value!r}; it must be {allowed}")
+    return wanted(value)  # type: ignore[no-any-return]  # int or float
+
+
+def _check_together(config: TableConfig, source: str) -> None:
+    for name in ("speed_deg_s", "acceleration_deg_s2"):
+        start, limit = getattr(config.power_on, name), getattr(config.limits, name)
+        if start > limit:
+            raise ConfigError(f"{source}: power_on.{name} is {start:g}; it must be at most limits.{name}, {limit:g}")
+    if not config.counts_per_turn.is_integer():
+        raise ConfigError(
+            f"{source}: gears.ratio is {config.gears.ratio!r}; with encoder.lines {config.encoder.lines} "
+            "it must give a whole number of counts a turn"
+        )
+    _check_registers(config, source)
+
+
+def _check_registers(config: TableConfig, source: str) -> None:
+    """Refuse what does not fit the firmware's number formats; see `fixed_point`."""
+    count_deg, tick_hz = config.counts_per_turn / 360.0, config.control.tick_hz
+    speed_most, acceleration_most = 31.0 * tick_hz / count_deg, tick_hz**2 / count_deg
+    if config.limits.speed_deg_s > speed_most:
+        raise ConfigError(
+            f"{source}: limits.speed_deg_s is {config.limits.speed_deg_s:g}; "
+            f"with this encoder and tick the firmware holds at most {speed_most:g}"
+        )
+    if config.limits.acceleration_deg_s2 > acceleration_most:
+        raise ConfigError(
+            f"{source}: limits.acceleration_deg_s2 is {config.limits.acceleration_deg_s2:g}; "
+            f"with this encoder and tick the firmware holds at most {acceleration_most:g}"
+        )

@@ -1,0 +1,234 @@
+"""Motor, gears with backlash, and table: the plant between the PWM voltage and the true angle of the table.
+
+The teeth of the chain are either in contact, on the flank that drives the table forwards (`contact` = 1) or backwards
+(-1), and motor and table turn as one; or the motor runs free within the backlash (0), and the table coasts. A tick is
+taken in one of these states. Contact ends when the table would have to pull on the flank; when the gap closes, the two
+speeds meet without rebound.
+
+The gears' efficiency acts on the torque through the teeth: a table that is driven weighs 1/efficiency of its torque on
+the motor, one that drives the motor only its efficiency.
+"""
+
+import math
+from typing import NamedTuple
+
+from emulator.config import TableConfig
+from emulator.friction import Friction, sliding_torque_Nm
+from emulator.motor import MotorStep, discretise
+
+
+class Coupling(NamedTuple):
+    """Motor and table in contact, for one direction of the power through the teeth."""
+
+    motor: MotorStep
+    torque_ratio: float  # torque at the motor for a torque at the table
+    inertia_kg_m2: float  # of the table, at the motor
+
+
+class DriveTrain(NamedTuple):
+    """The constants of the plant, per tick."""
+
+    free: MotorStep
+    driving: Coupling
+    overhauling: Coupling
+    friction: Friction
+    torque_constant_Nm_A: float
+    resistance_ohm: float
+    current_decay: float  # of a motor that stands, per tick
+    motor_inertia_kg_m2: float  # with the gears
+    table_inertia_kg_m2: float
+    bearing_friction_Nm: float
+    ratio: float
+    table_per_motor: float  # the reciprocal of the ratio
+    half_gap_rad: float  # at the table
+    tick_s: float
+    table_inertia_s: (
+        float  # inertia at the table times the gears' reciprocal, over the tick: torque for a change of speed
+    )
+
+
+class DriveState(NamedTuple):
+    """Where the plant is. Angles are unwrapped."""
+
+    current_A: float
+    speed_rad_s: float  # of the motor
+    angle_rad: float  # of the motor
+    table_speed_rad_s: float
+    table_angle_rad: float
+    contact: int
+
+
+def drive_train(config: TableConfig) -> DriveTrain:
+    """Return the plant of a configured table."""
+    motor, gears, table = config.motor, config.gears, config.table
+    tick_s = 1.0 / config.control.tick_hz
+    motor_inertia = motor.rotor_inertia_kg_m2 + gears.inertia_kg_m2
+
+    def step_with(inertia_kg_m2: float) -> MotorStep:
+        return discretise(
+            motor.resistance_ohm,
+            motor.inductance_H,
+            motor.torque_constant_Nm_A,
+            inertia_kg_m2,
+            config.friction.viscous_Nm_s,
+            tick_s,
+        )
+
+    def coupling(torque_ratio: float) -> Coupling:
+        inertia = table.inertia_kg_m2 * torque_ratio / gears.ratio
+        return Coupling(step_with(motor_inertia + inertia), torque_ratio, inertia)
+
+    coulomb = config.friction.coulomb_Nm
+    return DriveTrain(
+        free=step_with(motor_inertia),
+        driving=coupling(1.0 / (gears.ratio * gears.efficiency)),
+        overhauling=coupling(gears.efficiency / gears.ratio),
+        friction=Friction(
+            coulomb, coulomb * config.friction.stiction_ratio, 1.0 / config.friction.stribeck_speed_rad_s
+        ),
+        torque_constant_Nm_A=motor.torque_constant_Nm_A,
+        resistance_ohm=motor.resistance_ohm,
+        current_decay=math.exp(-motor.resistance_ohm / motor.inductance_H * tick_s),
+        motor_inertia_kg_m2=motor_inertia,
+        table_inertia_kg_m2=table.inertia_kg_m2,
+        bearing_friction_Nm=table.bearing_friction_Nm,
+        ratio=gears.ratio,
+        table_per_motor=1.0 / gears.ratio,
+        half_gap_rad=math.radians(gears.backlash_arcmin / 60.0) / 2.0,
+        tick_s=tick_s,
+        table_inertia_s=table.inertia_kg_m2 / (gears.ratio * tick_s),
+    )
+
+
+def at_standstill(train: DriveTrain, gap_share: float) -> DriveState:
+    """Return a plant at rest whose teeth stand at `gap_share` (-1..1) of the way from mid-gap to a flank."""
+    contact = 1 if train.half_gap_rad == 0.0 else 0
+    return DriveState(0.0, 0.0, 0.0, 0.0, -gap_share * train.half_gap_rad, contact)
+
+
+def step(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
+    """Return the plant one tick later; the load torque at the table resists positive rotation."""
+    if state.contact == 0:
+        return _free(train, state, voltage_V, load_torque_Nm)
+    if state.speed_rad_s == 0.0:
+        return _standing(train, state, voltage_V, load_torque_Nm)
+    return _turning(train, state, voltage_V, load_torque_Nm)
+
+
+def _turning(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
+    """In contact and moving. Friction keeps the value that it has at the start of the tick."""
+    speed, contact = state.speed_rad_s, state.contact
+    direction = 1 if speed > 0.0 else -1
+    rigid = train.half_gap_rad == 0.0
+    coupling = train.driving if rigid or direction == contact else train.overhauling
+    table_torque = direction * train.bearing_friction_Nm + load_torque_Nm
+    friction = direction * sliding_torque_Nm(train.friction, speed)
+    current, next_speed, angle = _motor(
+        coupling.motor, state, voltage_V, friction + coupling.torque_ratio * table_torque
+    )
+    if not rigid:
+        accelerating_torque = train.table_inertia_s * (next_speed - speed)
+        if contact * (accelerating_torque + table_torque) < 0.0:
+            return _free(train, state, voltage_V, load_torque_Nm)
+    if next_speed * direction <= 0.0:
+        next_speed, angle = 0.0, _stopping_angle(state.angle_rad, speed, next_speed, train.tick_s)
+    return _together(train, current, next_speed, angle, contact)
+
+
+def _standing(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
+    """In contact and at rest: static friction holds, or the motor breaks away, or one side leaves the flank."""
+    contact, rigid = state.contact, train.half_gap_rad == 0.0
+    current = _standing_current(train, state.current_A, voltage_V)
+    torque = train.torque_constant_Nm_A * current
+    pressed = contact * load_torque_Nm > train.bearing_friction_Nm
+    pulled = contact * load_torque_Nm < -train.bearing_friction_Nm
+    if not rigid and (pulled or (contact * torque < 0.0 and not pressed)):
+        return _free(train, state, voltage_V, load_torque_Nm)
+    coupling = train.driving if rigid or contact * torque >= 0.0 else train.overhauling
+    net = torque - coupling.torque_ratio * load_torque_Nm
+    holding = train.friction.static_Nm + coupling.torque_ratio * train.bearing_friction_Nm
+    if abs(net) <= holding:
+        return DriveState(current, 0.0, state.angle_rad, 0.0, state.table_angle_rad, contact)
+    direction = 1 if net > 0.0 else -1
+    resisting = direction * holding + coupling.torque_ratio * load_torque_Nm
+    current, speed, angle = _motor(coupling.motor, state, voltage_V, resisting)
+    if speed * direction <= 0.0:
+        return DriveState(current, 0.0, state.angle_rad, 0.0, state.table_angle_rad, contact)
+    return _together(train, current, speed, angle, contact)
+
+
+def _free(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
+    """Within the gap: the motor runs alone, the table coasts, until they meet."""
+    current, speed, angle = _free_motor(train, state, voltage_V)
+    table_speed, table_angle = _coasting_table(train, state, load_torque_Nm)
+    gap = angle * train.table_per_motor - table_angle
+    if abs(gap) < train.half_gap_rad:
+        return DriveState(current, speed, angle, table_speed, table_angle, 0)
+    contact = 1 if gap > 0.0 else -1
+    gap_before = state.angle_rad * train.table_per_motor - state.table_angle_rad
+    closing = gap - gap_before
+    share = (contact * train.half_gap_rad - gap_before) / closing if contact * closing > 0.0 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    inertia = (train.driving if contact * speed >= 0.0 else train.overhauling).inertia_kg_m2
+    momentum = train.motor_inertia_kg_m2 * speed + inertia * train.ratio * table_speed
+    common_speed = momentum / (train.motor_inertia_kg_m2 + inertia)
+    angle = state.angle_rad + share * (angle - state.angle_rad) + (1.0 - share) * train.tick_s * common_speed
+    return _together(train, current, common_speed, angle, contact)
+
+
+def _free_motor(train: DriveTrain, state: DriveState, voltage_V: float) -> tuple[float, float, float]:
+    speed = state.speed_rad_s
+    direction = 1 if speed > 0.0 else -1
+    resisting = direction * sliding_torque_Nm(train.friction, speed)
+    if speed == 0.0:
+        current = _standing_current(train, state.current_A, voltage_V)
+        torque = train.torque_constant_Nm_A * current
+        if abs(torque) <= train.friction.static_Nm:
+            return current, 0.0, state.angle_rad
+        direction = 1 if torque > 0.0 else -1
+        resisting = direction * train.friction.static_Nm
+    current, next_speed, angle = _motor(train.free, state, voltage_V, resisting)
+    if next_speed * direction <= 0.0:
+        return current, 0.0, _stopping_angle(state.angle_rad, speed, next_speed, train.tick_s)
+    return current, next_speed, angle
+
+
+def _coasting_table(train: DriveTrain, state: DriveState, load_torque_Nm: float) -> tuple[float, float]:
+    speed, angle = state.table_speed_rad_s, state.table_angle_rad
+    if speed == 0.0:
+        if abs(load_torque_Nm) <= train.bearing_friction_Nm:
+            return speed, angle
+        direction = -1 if load_torque_Nm > 0.0 else 1
+    else:
+        direction = 1 if speed > 0.0 else -1
+    deceleration = (direction * train.bearing_friction_Nm + load_torque_Nm) / train.table_inertia_kg_m2
+    next_speed = speed - deceleration * train.tick_s
+    if next_speed * direction <= 0.0:
+        return 0.0, _stopping_angle(angle, speed, next_speed, train.tick_s)
+    return next_speed, angle + 0.5 * (speed + next_speed) * train.tick_s
+
+
+def _motor(motor: MotorStep, state: DriveState, voltage_V: float, torque_Nm: float) -> tuple[float, float, float]:
+    ii, iw, iv, im, wi, ww, wv, wm, ai, aw, av, am = motor
+    current, speed = state.current_A, state.speed_rad_s
+    return (
+        ii * current + iw * speed + iv * voltage_V + im * torque_Nm,
+        wi * current + ww * speed + wv * voltage_V + wm * torque_Nm,
+        state.angle_rad + ai * current + aw * speed + av * voltage_V + am * torque_Nm,
+    )
+
+
+def _standing_current(train: DriveTrain, current_A: float, voltage_V: float) -> float:
+    final = voltage_V / train.resistance_ohm
+    return final + (current_A - final) * train.current_decay
+
+
+def _stopping_angle(angle_rad: float, speed_rad_s: float, next_speed_rad_s: float, tick_s: float) -> float:
+    """Return where a body stops that would have changed its direction within the tick."""
+    change = speed_rad_s - next_speed_rad_s
+    return angle_rad if change == 0.0 else angle_rad + 0.5 * speed_rad_s * tick_s * speed_rad_s / change
+
+
+def _together(train: DriveTrain, current_A: float, speed_rad_s: float, angle_rad: float, contact: int) -> DriveState:
+    table_angle = angle_rad * train.table_per_motor - contact * train.half_gap_rad
+    return DriveState(current_A, speed_rad_s, angle_rad, speed_rad_s * train.table_per_motor, table_angle, contact)

@@ -1,0 +1,132 @@
+"""The controller's tick: profiler, speed estimate, PID, and the protection of the motor.
+
+A motion runs through these states:
+
+    IDLE     the drive is off; friction holds the table
+    MOVING   the profile runs, the PID follows its speed
+    SETTLING the profile has ended; the table creeps to the target until the encoder reaches it, then IDLE
+    STALLED  the motor was driven but the encoder stood still: the drive is off until the next motion
+"""
+
+from typing import NamedTuple
+
+from emulator.config import TableConfig
+from emulator.fixed_point import ERROR_BITS, POSITION_BITS, SPEED_BITS, to_fixed, wrap_int32
+from emulator.pid import HOLD, RAMP, Pid, PidState, duty_max, pid, switched_off
+from emulator.pid import step as pid_step
+from emulator.profiler import Profile, Reference, at_rest, retarget
+from emulator.profiler import step as profiler_step
+
+IDLE = 0
+MOVING = 1
+SETTLING = 2
+STALLED = 3
+
+STATE_NAMES = ("idle", "moving", "settling", "stalled")
+
+
+class Firmware(NamedTuple):
+    """The controller's constants, in its own formats."""
+
+    pid: Pid
+    window_ticks: int
+    arrival_count: int
+    approach_rate: int  # of speed over remaining distance, per tick; 26 fraction bits
+    approach_speed: int  # count/tick, 26 fraction bits
+    stall_duty: int  # PWM steps
+    stall_ticks: int
+    settling_ticks: int
+
+
+class FirmwareState(NamedTuple):
+    """The controller's memory."""
+
+    motion: int
+    profile: Profile
+    reference: Reference
+    counts: tuple[int, ...]  # of the last ticks, oldest first, as many as the speed window
+    pid: PidState
+    still_ticks: int  # driven hard without a change of the count
+    settling_ticks: int
+
+
+def firmware(config: TableConfig) -> Firmware:
+    """Return the controller of a configured table."""
+    tick_hz = config.control.tick_hz
+    settling, protection = config.settling, config.protection
+    return Firmware(
+        pid=pid(config),
+        window_ticks=config.control.speed_window_ticks,
+        arrival_count=settling.arrival_count,
+        approach_rate=to_fixed(settling.approach_rate_1_s / tick_hz, SPEED_BITS),
+        approach_speed=to_fixed(settling.approach_speed_deg_s * config.counts_per_turn / 360.0 / tick_hz, SPEED_BITS),
+        stall_duty=round(protection.stall_duty * duty_max(config)),
+        stall_ticks=round(protection.stall_time_s * tick_hz),
+        settling_ticks=round(protection.settling_time_s * tick_hz),
+    )
+
+
+def power_on(parameters: Firmware, profile: Profile, count: int) -> FirmwareState:
+    """Return the controller as it wakes: at rest where the encoder stands."""
+    return FirmwareState(
+        motion=IDLE,
+        profile=profile,
+        reference=Reference(count, 0, 0, 0, 0),
+        counts=(count,) * parameters.window_ticks,
+        pid=PidState(0, 0, HOLD, 0),
+        still_ticks=0,
+        settling_ticks=0,
+    )
+
+
+def begin_motion(state: FirmwareState, profile: Profile, distance: int) -> FirmwareState:
+    """Return the controller with a new target, `distance` (26 fraction bits) from the reference.
+
+    The reference goes on from its present position and speed; that of a table that stalled is where it stands.
+    """
+    return FirmwareState(MOVING, profile, retarget(state.reference, distance), state.counts, state.pid, 0, 0)
+
+
+def distance_to(reference: Reference, target: int) -> int:
+    """Return the way to an absolute position; both with 26 fraction bits, neither modulo a turn."""
+    return target - (reference.position_count << POSITION_BITS) - reference.fraction
+
+
+def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareState:
+    """Return the controller after one tick, at the end of which the encoder's counter reads `count`."""
+    motion, profile, reference, counts, regulator, still_ticks, settling_ticks = state
+    measured = wrap_int32(count - counts[0])
+    last_count = counts[-1]
+    counts = (*counts[1:], count)
+    if motion in (IDLE, STALLED):
+        return FirmwareState(motion, profile, reference, counts, switched_off(regulator, measured), 0, 0)
+
+    if motion == MOVING:
+        last_speed = reference.speed
+        reference = profiler_step(profile, reference)
+        demand = reference.speed
+        gain_set = HOLD if reference.speed == last_speed else RAMP
+        if at_rest(reference):
+            motion = SETTLING
+    else:
+        remaining = position_error(reference, count)
+        passed = remaining * position_error(reference, last_count) <= 0
+        if abs(remaining) <= parameters.arrival_count or passed:
+            return FirmwareState(IDLE, profile, reference, counts, switched_off(regulator, measured), 0, 0)
+        demand = min(max(remaining * parameters.approach_rate, -parameters.approach_speed), parameters.approach_speed)
+        gain_set = HOLD
+        settling_ticks += 1
+
+    window_demand = (demand * parameters.window_ticks) >> (SPEED_BITS - ERROR_BITS)
+    regulator = pid_step(parameters.pid, regulator, gain_set, window_demand, measured)
+    driven = abs(regulator.duty) >= parameters.stall_duty
+    still_ticks = still_ticks + 1 if driven and count == last_count else 0
+    if still_ticks >= parameters.stall_ticks or settling_ticks >= parameters.settling_ticks:
+        stands = Reference(count, 0, 0, 0, 0)
+        return FirmwareState(STALLED, profile, stands, counts, switched_off(regulator, measured), 0, 0)
+    return FirmwareState(motion, profile, reference, counts, regulator, still_ticks, settling_ticks)
+
+
+def position_error(reference: Reference, count: int) -> int:
+    """Return how far the encoder is from the reference position, in whole counts."""
+    return wrap_int32(reference.position_count + (reference.fraction >> (POSITION_BITS - 1)) - count)

@@ -1,0 +1,42 @@
+"""The firmware's number formats: integers with a stated number of fraction bits.
+
+Each quantity fits a 32-bit register; a product of two, and a distance with its fraction, fit 64 bits. Shifts to the
+right round towards minus infinity, as an arithmetic shift does on the controller.
+
+| quantity | unit | fraction bits | register |
+|---|---|---|---|
+| position, distance | encoder count | 0, and a second word of 26 | 32 + 26 |
+| speed | count/tick | 26 | 32, so less than 32 counts a tick |
+| acceleration | count/tick^2 | 26 | 32 |
+| speed error | count/window | 8 | 32 |
+| proportional and derivative gain | PWM step/(count/window) | 12 | 32 |
+| integral gain | PWM step/(count/window) a tick | 16 | 32 |
+| integral, controller output | PWM step | 20 | 32 |
+"""
+
+from fractions import Fraction
+
+POSITION_BITS = 26
+SPEED_BITS = 26
+ERROR_BITS = 8
+GAIN_BITS = 12
+INTEGRAL_GAIN_BITS = 16
+OUTPUT_BITS = ERROR_BITS + GAIN_BITS
+
+POSITION_MASK = (1 << POSITION_BITS) - 1
+INT32_MAX = (1 << 31) - 1
+
+
+def wrap_int32(number: int) -> int:
+    """Return `number` as a 32-bit register in two's complement holds it."""
+    return ((number + 0x8000_0000) & 0xFFFF_FFFF) - 0x8000_0000
+
+
+def to_fixed(value: Fraction | float, fraction_bits: int) -> int:
+    """Return the integer nearest to `value` with that many fraction bits; halves go to the even one."""
+    return round(Fraction(value) * (1 << fraction_bits))
+
+
+def from_fixed(number: int, fraction_bits: int) -> float:
+    """Return the value of an integer with that many fraction bits."""
+    return number / (1 << fraction_bits)

@@ -1,0 +1,109 @@
+"""The speed PID in fixed point, with two gain sets, bumpless switching and anti-windup.
+
+    u = K (e + integral(e) / Ti - Td d(omega)/dt),    e = r - omega_R        (Fig. 3 of the paper)
+
+The derivative acts on the measured speed alone, so a step of the reference gives no kick. All numbers are integers;
+see `fixed_point`.
+"""
+
+from typing import NamedTuple
+
+from emulator.config import ConfigError, GainsConfig, TableConfig
+from emulator.fixed_point import ERROR_BITS, GAIN_BITS, INT32_MAX, INTEGRAL_GAIN_BITS, OUTPUT_BITS, to_fixed
+
+RAMP = 0
+HOLD = 1
+
+_HALF = 1 << (OUTPUT_BITS - 1)
+_INTEGRAL_SHIFT = ERROR_BITS + INTEGRAL_GAIN_BITS - OUTPUT_BITS
+_ERROR_MAX = (1 << 21) - 1
+
+
+class Gains(NamedTuple):
+    """One gain set, in the firmware's formats."""
+
+    proportional: int
+    integral: int
+    derivative: int
+
+
+class Pid(NamedTuple):
+    """The regulator's constants."""
+
+    ramp: Gains
+    hold: Gains
+    duty_max: int  # PWM steps
+
+
+class PidState(NamedTuple):
+    """What the regulator remembers from tick to tick."""
+
+    integral: int
+    measured: int  # count/window
+    gain_set: int
+    duty: int  # PWM steps
+
+
+def pid(config: TableConfig) -> Pid:
+    """Return the regulator of a configured table, its gains rounded to the firmware's formats."""
+    return Pid(fixed_gains(config, config.gains.ramp), fixed_gains(config, config.gains.hold), duty_max(config))
+
+
+def duty_max(config: TableConfig) -> int:
+    """Return the PWM steps at full duty."""
+    return int((1 << config.driver.pwm_bits) - 1)
+
+
+def fixed_gains(config: TableConfig, gains: GainsConfig) -> Gains:
+    """Return a gain set as the firmware holds it: PWM steps for a speed error of one count a window.
+
+    Raises:
+        ConfigError: A gain does not fit its register, or the integral gain rounds to nothing.
+    """
+    tick_s = 1.0 / config.control.tick_hz
+    deg_s_per_count = 360.0 / config.counts_per_turn / (config.control.speed_window_ticks * tick_s)
+    proportional = gains.proportional_duty_s_deg * duty_max(config) * deg_s_per_count
+    fixed = Gains(
+        to_fixed(proportional, GAIN_BITS),
+        to_fixed(proportional * tick_s / gains.integral_time_s, INTEGRAL_GAIN_BITS),
+        to_fixed(proportional * gains.derivative_time_s / tick_s, GAIN_BITS),
+    )
+    if max(fixed) > INT32_MAX or fixed.integral < 1:
+        raise ConfigError(
+            f"{gains} does not fit the firmware: its registers would hold {tuple(fixed)}; "
+            f"each must be at most {INT32_MAX}, the integral gain at least 1"
+        )
+    return fixed
+
+
+def switched_off(state: PidState, measured: int) -> PidState:
+    """Return the regulator of a drive that is off: nothing is remembered but the speed."""
+    return PidState(0, measured, state.gain_set, 0)
+
+
+def step(parameters: Pid, state: PidState, gain_set: int, demand: int, measured: int) -> PidState:
+    """Return the regulator after one tick.
+
+    Args:
+        parameters: The regulator's constants.
+        state: Its memory.
+        gain_set: `RAMP` or `HOLD`.
+        demand: Reference speed, count/window with 8 fraction bits.
+        measured: Measured speed, count/window.
+    """
+    gains = parameters.ramp if gain_set == RAMP else parameters.hold
+    error = min(max(demand - (measured << ERROR_BITS), -_ERROR_MAX), _ERROR_MAX)
+    change = (measured - state.measured) << ERROR_BITS
+    direct = gains.proportional * error - gains.derivative * change
+    integral = state.integral
+    if gain_set != state.gain_set:
+        before = parameters.hold if gain_set == RAMP else parameters.ramp
+        integral += before.proportional * error - before.derivative * change - direct  # the output does not jump
+    growth = (gains.integral * error) >> _INTEGRAL_SHIFT
+    top = parameters.duty_max << OUTPUT_BITS
+    output = direct + integral + growth
+    if (output < top or growth < 0) and (output > -top or growth > 0):  # saturated: no further into it
+        integral += growth
+    integral = min(max(integral, -top), top)
+    duty = (direct + integral + _HALF) >> OUTPUT_BITS
+    return PidState(integral, measured, gain_set, min(max(duty, -parameters.duty_max), parameters.duty_max))

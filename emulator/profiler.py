@@ -1,0 +1,101 @@
+"""The trapezoidal velocity profiler: the reference position and speed of the PID loop (Fig. 3 of the paper).
+
+The profile is not planned ahead. At each tick the reference takes the greatest speed that the acceleration, the top
+speed and the distance left to brake allow, so a new target, speed or acceleration may come at any time: the reference
+goes on from where it is, at the speed that it has (Fig. 4). All numbers are integers; see `fixed_point`.
+"""
+
+from typing import NamedTuple
+
+from emulator.fixed_point import POSITION_BITS, POSITION_MASK, wrap_int32
+
+
+class Profile(NamedTuple):
+    """What one motion must keep: top speed and acceleration, 26 fraction bits, counts and ticks."""
+
+    speed: int
+    acceleration: int
+    far: int  # a distance from which the table can always still brake
+
+    @classmethod
+    def of(cls, speed: int, acceleration: int) -> "Profile":
+        """Return the profile of a motion command; both arguments are greater than 0."""
+        return cls(speed, acceleration, (1 << 61) // acceleration)
+
+
+class Reference(NamedTuple):
+    """Where the profile is: position and the distance to the target, each a count and its fraction, and speed."""
+
+    position_count: int
+    fraction: int
+    speed: int
+    distance_count: int
+    distance_fraction: int
+
+
+def at_rest(reference: Reference) -> bool:
+    """Tell whether the profile has reached its target and stands."""
+    return reference.speed == 0 and reference.distance_count == 0 and reference.distance_fraction == 0
+
+
+def retarget(reference: Reference, distance: int) -> Reference:
+    """Return the reference with a new target, `distance` (26 fraction bits) away; position and speed go on."""
+    return Reference(
+        reference.position_count,
+        reference.fraction,
+        reference.speed,
+        distance >> POSITION_BITS,
+        distance & POSITION_MASK,
+    )
+
+
+def step(profile: Profile, reference: Reference) -> Reference:
+    """Return the reference one tick later."""
+    position_count, fraction, speed, distance_count, distance_fraction = reference
+    distance = (distance_count << POSITION_BITS) + distance_fraction
+    if distance > 0 or (distance == 0 and speed < 0):
+        speed, advance = _towards(profile, speed, distance)
+    else:
+        speed, advance = _towards(profile, -speed, -distance)
+        speed, advance = -speed, -advance
+    fraction += advance
+    distance -= advance
+    return Reference(
+        wrap_int32(position_count + (fraction >> POSITION_BITS)),
+        fraction & POSITION_MASK,
+        speed,
+        distance >> POSITION_BITS,
+        distance & POSITION_MASK,
+    )
+
+
+def _towards(profile: Profile, speed: int, distance: int) -> tuple[int, int]:
+    """Return the next speed, and the way made until then, for a target ahead (`distance` >= 0).
+
+    From the next speed v' the table brakes at a over v'^2 / 2a. It stops in time when
+    (v + v') / 2 + v'^2 / 2a <= distance, that is v'^2 + a (v + v') <= 2 a distance.
+    """
+    top_speed, acceleration, far = profile
+    fastest = max(min(speed + acceleration, top_speed), speed - acceleration)
+    if 0 <= speed <= acceleration and (2 * distance < speed or distance <= (acceleration >> 2) + 2):
+        return 0, distance  # the rest of the way is shorter than a tick
+    if fastest > 0 and distance < far:
+        room = 2 * acceleration * distance - acceleration * speed
+        if fastest * (fastest + acceleration) > room:
+            fastest = max(_greatest_root(acceleration, room, fastest), speed - acceleration)
+    return fastest, (speed + fastest) >> 1
+
+
+def _greatest_root(acceleration: int, room: int, above: int) -> int:
+    """Return the greatest whole v >= 0 with v (v + a) <= room, or 0; `above` is not less than it.
+
+    Newton's method from above, on a convex function: it falls until it is there, mostly within three rounds.
+    """
+    if room <= 0:
+        return 0
+    root = above
+    lower = (root * root + room) // (2 * root + acceleration)
+    while lower < root:
+        root = lower
+        lower = (root * root + room) // (2 * root + acceleration)
+    return root

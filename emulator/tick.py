@@ -1,0 +1,51 @@
+"""One tick of the whole table: voltage to motion to counts to the next voltage.
+
+A pure function of constants, state and inputs, in the part of Python that numba compiles: the stand-in runs it
+interpreted, `batch` compiled, with the same results to the last bit. The new duty waits in the PWM's buffer for one
+tick, as the controller computes while the old one is on the bridge.
+"""
+
+from typing import NamedTuple
+
+from emulator.config import TableConfig
+from emulator.drive_train import DriveState, DriveTrain, drive_train
+from emulator.drive_train import step as drive_step
+from emulator.encoder import Encoder, count_at, encoder
+from emulator.firmware import Firmware, FirmwareState, firmware
+from emulator.firmware import step as firmware_step
+from emulator.pid import duty_max
+
+
+class TableConstants(NamedTuple):
+    """All constants of a table, per tick."""
+
+    drive: DriveTrain
+    encoder: Encoder
+    firmware: Firmware
+    volts_per_duty: float
+
+
+class TableState(NamedTuple):
+    """Plant and controller at the end of a tick."""
+
+    drive: DriveState
+    firmware: FirmwareState
+    duty: int  # on the bridge in the coming tick, PWM steps
+
+
+def table_constants(config: TableConfig, encoder_phase: float) -> TableConstants:
+    """Return the constants of a configured table."""
+    return TableConstants(
+        drive_train(config),
+        encoder(config, encoder_phase),
+        firmware(config),
+        config.driver.supply_V / duty_max(config),
+    )
+
+
+def step(constants: TableConstants, state: TableState, load_torque_Nm: float) -> TableState:
+    """Return the table one tick later."""
+    drive = drive_step(constants.drive, state.drive, state.duty * constants.volts_per_duty, load_torque_Nm)
+    count = count_at(constants.encoder, drive.angle_rad)
+    controller = firmware_step(constants.firmware, state.firmware, count)
+    return TableState(drive, controller, state.firmware.pid.duty)
