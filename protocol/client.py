@@ -36,12 +36,12 @@ class TableClient:
 
     Finding the place. Replies carry no number; all that is known is that they come in order, at most one for each
     line. The client therefore sends a line only when all earlier ones are answered, and when it cannot know that (at
-    the start, after a time-out, after an unexpected byte) it first makes sure, with lines that only read. Let at most
+    the start, after a time-out, after an unexpected reply) it first makes sure, with lines that only read. Let at most
     n replies to a verb X (H or L) still be under way. Of the next n + 1 replies to X at least one then answers a line
     sent since, and all that was sent before that line is settled: answered, or never to be. So when the other verb Y
     is sent after that, the first reply to Y answers it, and Y was the last line: nothing is under way. No assumption
     about delays is made; replies may be lost, cut, garbled, or late by any time. (A table that answers a line twice
-    breaks the premise; what it sends is noticed where it is already there before the next line.)
+    breaks the premise; the second answer is dropped if it is there before the next line is sent.)
     """
 
     def __init__(self, port: Port, timeout_s: float = 1.0, decimals: int = 1) -> None:
@@ -126,7 +126,7 @@ class TableClient:
         stop = Command(Verb.MOVE_BY, Decimal(0))
         if self._has_lost_its_place():
             self._write(_CANCEL)
-            self._send(stop)
+            self._send(stop.verb, encode_command(stop))
         self._exchange(stop)
 
     def wait_until_at(
@@ -177,7 +177,7 @@ class TableClient:
         sent = encode_command(command, self._decimals)
         if self._has_lost_its_place():
             self._find_place()
-        self._send(command)
+        self._send(command.verb, sent)
         reply = self._next_reply(sent, self.clock.now_s() + self._timeout_s)
         if not _answers(reply, command.verb):
             raise UnexpectedReply(
@@ -192,7 +192,7 @@ class TableClient:
 
     def _has_lost_its_place(self) -> bool:
         """Tell whether the next reply could be any other than that to the next command."""
-        return self._unanswered.total() > 0 or bool(self._arrived) or self._waiting() > 0
+        return self._unanswered.total() > 0
 
     def _find_place(self) -> None:
         """Bring about that no reply is under way, as the class's docstring proves, or raise ReplyTimeout.
@@ -210,7 +210,8 @@ class TableClient:
 
     def _ask(self, verb: Verb) -> None:
         """Send a read and wait for a reply to this verb, to this line or to one before; all else is dropped."""
-        sent = self._send(Command(verb))
+        sent = encode_command(Command(verb))
+        self._send(verb, sent)
         deadline_s = self.clock.now_s() + self._timeout_s
         while True:
             try:
@@ -221,17 +222,15 @@ class TableClient:
                 self._unanswered[verb] -= 1
                 return
 
-    def _send(self, command: Command) -> bytes:
+    def _send(self, verb: Verb, line: bytes) -> None:
         """Send a command; what has come in before is no answer to it, and is dropped."""
-        line = encode_command(command, self._decimals)
         if self._waiting():
             self._receive()
         self._arrived.clear()
         self._lines.discard()
         self._last_line = "nothing"
-        self._unanswered[command.verb] += 1
+        self._unanswered[verb] += 1
         self._write(line)
-        return line
 
     def _next_reply(self, sent: bytes, deadline_s: float) -> Reply:
         """Return the next reply, or raise ReplyTimeout or UnexpectedReply."""
