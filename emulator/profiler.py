@@ -15,12 +15,17 @@ class Profile(NamedTuple):
 
     speed: int
     acceleration: int
-    far: int  # a distance from which the table can always still brake
+    far: int  # see `far_distance`
 
     @classmethod
     def of(cls, speed: int, acceleration: int) -> "Profile":
         """Return the profile of a motion command; both arguments are greater than 0."""
-        return cls(speed, acceleration, (1 << 61) // acceleration)
+        return cls(speed, acceleration, far_distance(acceleration))
+
+
+def far_distance(acceleration: int) -> int:
+    """Return a distance from which any speed can be braked; up to it, `step` stays within 64 bits."""
+    return (1 << 61) // acceleration
 
 
 class Reference(NamedTuple):
