@@ -29,6 +29,7 @@ from protocol import (
     TableClient,
     TableError,
     UnexpectedReply,
+    Verb,
     decode_command,
     encode_reply,
 )
@@ -243,6 +244,16 @@ def test_a_silent_table_is_told_from_one_that_says_something_else() -> None:
         client.position_deg()
     with pytest.raises(ReplyTimeout, match="got b'login:'"):
         TableClient(TablePort([replaced(b"login:\r")] * 9)).position_deg()
+
+
+def test_a_time_out_tells_whether_the_command_was_sent() -> None:
+    client = client_in_place(port := TablePort())
+    port.give_fates(*[lost] * 10)
+    with pytest.raises(ReplyTimeout, match=r"sent b'P 1.0\\r', .* it may have been carried out"):
+        client.move_to(1)
+    with pytest.raises(ReplyTimeout, match="nothing else was sent"):
+        client.move_to(2)
+    assert Command(Verb.MOVE_TO, Decimal(2)) not in port.heard
 
 
 def test_a_time_out_takes_the_time_that_it_says() -> None:

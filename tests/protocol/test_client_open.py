@@ -2,7 +2,7 @@
 
 import pytest
 
-from protocol import PortError, ReplyTimeout, TableClient
+from protocol import PortError, ReplyTimeout, TableClient, WallClock
 
 
 def test_a_port_that_is_not_there_is_a_port_error() -> None:
@@ -21,3 +21,11 @@ def test_a_line_that_only_echoes_is_no_table() -> None:
         pytest.raises(ReplyTimeout, match=r"sent b'[HL]\\r', got b'[HL]'"),
     ):
         client.position_deg()
+
+
+def test_a_port_without_a_clock_of_its_own_lives_in_real_time() -> None:
+    with TableClient.open("loop://") as client:
+        assert isinstance(client.clock, WallClock)
+        before_s = client.clock.now_s()
+        client.clock.sleep_s(0.01)
+        assert client.clock.now_s() - before_s >= 0.01
