@@ -1,0 +1,48 @@
+"""What a way in to the table is to the server: bytes both ways, and clients that come and go."""
+
+from typing import NamedTuple, Protocol
+
+
+class Arrival(NamedTuple):
+    """What clients did since the last look.
+
+    `left_before` and `left_after` say that a client went away before or after `data` was sent: a half line that it
+    left behind ends there.
+    """
+
+    left_before: bool = False
+    data: bytes = b""
+    left_after: bool = False
+
+
+class Port(Protocol):
+    """One way in to the table. Nothing here blocks."""
+
+    name: str
+    """What a client opens."""
+
+    @property
+    def input_descriptors(self) -> tuple[int, ...]:
+        """What becomes readable when `receive` has something to return."""
+        ...
+
+    @property
+    def output_descriptors(self) -> tuple[int, ...]:
+        """What becomes writable when `flush` can do something; empty when there is nothing to flush."""
+        ...
+
+    def receive(self) -> Arrival:
+        """Return what clients did since the last call."""
+        ...
+
+    def send(self, data: bytes) -> None:
+        """Give bytes to the client; what it does not take is lost in the end, as on a wire."""
+        ...
+
+    def flush(self) -> None:
+        """Give the client more of what it has not taken yet."""
+        ...
+
+    def close(self) -> None:
+        """Give everything back to the system."""
+        ...

@@ -1,0 +1,142 @@
+"""A pseudo-terminal that behaves as the serial port of the table (POSIX only).
+
+The device is raw and at the table's own rate before its name is known, the server holds it open for ever, nothing
+here blocks, and the clients that come and go are watched.
+"""
+
+import os
+import termios
+import tty
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from emulator.framing import rates_agree, read_at_rate
+from emulator.inotify import CLOSED, OPENED, WRITTEN, DeviceWatch
+from emulator.outbox import Outbox
+from emulator.port import Arrival
+from emulator.terminal_baud import get_baud, set_baud
+
+READ_BYTES = 4096
+"""Most that one read takes: a pty holds no more for one side."""
+
+_DEFAULT_BAUD = 9600
+
+
+class PtyPort:
+    """The server's end of a pty whose other end a client opens as a serial port.
+
+    Args:
+        baud: the table's rate in baud; 0 when bytes are not paced, and no rate of the client's is then wrong.
+        warn: takes one sentence for the person who runs the stand-in.
+
+    Raises:
+        OSError: the system has no pty to give.
+    """
+
+    def __init__(self, baud: int, warn: Callable[[str], None]) -> None:
+        self._baud = baud
+        self._warn = warn
+        self._server, self._device = os.openpty()
+        tty.setraw(self._device)
+        set_baud(self._device, baud or _DEFAULT_BAUD)
+        os.set_blocking(self._server, False)
+        self._settings = termios.tcgetattr(self._device)
+        self.name = os.ttyname(self._device)
+        self._watch = DeviceWatch.start(Path(self.name))
+        if self._watch is None:
+            warn(f"this system does not tell who opens {self.name}: a client that leaves in mid-line goes unnoticed")
+        self._clients = 0
+        self._client_baud = baud
+        self._outbox = Outbox()
+
+    @property
+    def input_descriptors(self) -> tuple[int, ...]:
+        """What becomes readable when a client comes, goes or sends."""
+        return (self._server,) if self._watch is None else (self._server, self._watch.descriptor)
+
+    @property
+    def output_descriptors(self) -> tuple[int, ...]:
+        """What becomes writable when the client has read something, while replies are held back for it."""
+        return (self._server,) if self._outbox else ()
+
+    def receive(self) -> Arrival:
+        """Return what clients have done since the last call."""
+        left, wrote_since = self._follow_clients()
+        data = self._read()
+        if left and self._clients == 0:
+            self._restore_device()
+        # A client that came after the other left wrote this, or else it is what the other left behind.
+        return Arrival(left_before=left and wrote_since, data=data, left_after=left and not wrote_since)
+
+    def send(self, data: bytes) -> None:
+        """Give replies to the client; they are lost when nobody has the port open, or nobody reads it."""
+        if self._watch is not None and self._clients == 0:
+            return
+        was_dropping = bool(self._outbox.dropped_bytes)
+        self._outbox.put(self._as_heard(data, self._baud, self._client_baud))
+        self.flush()
+        if self._outbox.dropped_bytes and not was_dropping:
+            self._warn(f"the client on {self.name} does not read its replies: they are dropped")
+
+    def flush(self) -> None:
+        """Give the client more of the replies that it has not taken yet."""
+        self._outbox.flush(partial(os.write, self._server))
+
+    def close(self) -> None:
+        """Close both ends; a client that is still there reads end of file."""
+        if self._watch is not None:
+            self._watch.close()
+        os.close(self._device)
+        os.close(self._server)
+
+    def _read(self) -> bytes:
+        self._notice_rate()
+        try:
+            data = os.read(self._server, READ_BYTES)
+        except BlockingIOError:
+            return b""
+        return self._as_heard(data, self._client_baud, self._baud)
+
+    def _follow_clients(self) -> tuple[bool, bool]:
+        """Return whether the last client left since the last call, and whether another wrote after that."""
+        left = wrote_since = False
+        for event in self._watch.events() if self._watch is not None else ():
+            if event == OPENED:
+                self._clients += 1
+                if self._clients == 2:
+                    self._warn(f"two programs have {self.name} open: each takes some of the other's replies")
+            elif event == CLOSED:
+                self._clients = max(0, self._clients - 1)
+                if self._clients == 0:
+                    left, wrote_since = True, False
+            elif event == WRITTEN:
+                wrote_since = left
+        return left, wrote_since
+
+    def _restore_device(self) -> None:
+        """Leave the device to the next client as the first one found it, with no reply to the last one in it."""
+        if self._outbox.dropped_bytes:
+            self._warn(f"{self._outbox.dropped_bytes} bytes of replies were dropped, since nobody read them")
+        self._outbox.clear()
+        termios.tcflush(self._device, termios.TCIFLUSH)
+        if termios.tcgetattr(self._device) != self._settings:
+            termios.tcsetattr(self._device, termios.TCSANOW, self._settings)
+            set_baud(self._device, self._baud or _DEFAULT_BAUD)
+
+    def _notice_rate(self) -> None:
+        """Look up the client's rate, and say so when it is a new one that the table does not understand."""
+        client_baud = get_baud(self._server)
+        if client_baud in {self._client_baud, 0} or not self._baud:
+            return
+        self._client_baud = client_baud
+        if not rates_agree(client_baud, self._baud):
+            self._warn(
+                f"the client on {self.name} is set to {client_baud} baud and the table to {self._baud}: both read "
+                f"garbage until the client is set to {self._baud} (or the table is started with --baud {client_baud})"
+            )
+
+    def _as_heard(self, data: bytes, sender_baud: int, receiver_baud: int) -> bytes:
+        if not (data and self._baud and sender_baud and receiver_baud):
+            return data
+        return read_at_rate(data, sender_baud, receiver_baud)

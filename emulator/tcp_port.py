@@ -1,0 +1,131 @@
+"""The table's serial port over TCP, for pyserial's `socket://host:port`."""
+
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+
+from emulator.outbox import Outbox
+from emulator.port import Arrival
+
+LOOPBACK = "127.0.0.1"
+READ_BYTES = 4096
+
+
+def parse_address(text: str) -> tuple[str, int]:
+    """Return host and port of `[HOST:]PORT`; the host is the loopback address unless it is given.
+
+    An IPv6 address stands in brackets: `[::1]:7000`.
+
+    Raises:
+        ValueError: the text is no such address.
+    """
+    host, _, port = text.rpartition(":")
+    bare = host[1:-1] if host.startswith("[") and host.endswith("]") else host
+    if not (port.isascii() and port.isdigit() and int(port) <= 65535) or (":" in bare and bare == host):
+        raise ValueError(f"'{text}' is not [HOST:]PORT with a port from 0 (any free one) to 65535")
+    return bare or LOOPBACK, int(port)
+
+
+class TcpPort:
+    """A listening socket that serves one client at a time; a second one is turned away at once.
+
+    Args:
+        host: name or address to listen on.
+        port: TCP port, 0 for any that is free.
+        warn: takes one sentence for the person who runs the stand-in.
+
+    Raises:
+        OSError: the address cannot be listened on.
+    """
+
+    def __init__(self, host: str, port: int, warn: Callable[[str], None]) -> None:
+        self._warn = warn
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        self._listener = socket.create_server((host, port), family=family)
+        self._listener.setblocking(False)
+        self._client: socket.socket | None = None
+        self._outbox = Outbox()
+        bound_port = self._listener.getsockname()[1]
+        self.name = f"socket://[{host}]:{bound_port}" if ":" in host else f"socket://{host}:{bound_port}"
+
+    @property
+    def input_descriptors(self) -> tuple[int, ...]:
+        """What becomes readable when a client comes, goes or sends."""
+        listener = self._listener.fileno()
+        return (listener,) if self._client is None else (listener, self._client.fileno())
+
+    @property
+    def output_descriptors(self) -> tuple[int, ...]:
+        """What becomes writable when the client has read something, while replies are held back for it."""
+        return (self._client.fileno(),) if self._client is not None and self._outbox else ()
+
+    def receive(self) -> Arrival:
+        """Return what the client has done since the last call."""
+        arrival = self._read()
+        self._accept()
+        return arrival
+
+    def send(self, data: bytes) -> None:
+        """Give replies to the client; they are lost when there is none, or it does not read."""
+        if self._client is None:
+            return
+        was_dropping = bool(self._outbox.dropped_bytes)
+        self._outbox.put(data)
+        self.flush()
+        if self._outbox.dropped_bytes and not was_dropping:
+            self._warn(f"the client on {self.name} does not read its replies: they are dropped")
+
+    def flush(self) -> None:
+        """Give the client more of the replies that it has not taken yet."""
+        if self._client is not None:
+            try:
+                self._outbox.flush(self._client.send)
+            except OSError:
+                self._outbox.clear()  # The connection is broken: the next read says so.
+
+    def close(self) -> None:
+        """Hang up and stop listening."""
+        self._hang_up()
+        self._listener.close()
+
+    def _read(self) -> Arrival:
+        if self._client is None:
+            return Arrival()
+        try:
+            data = self._client.recv(READ_BYTES)
+        except BlockingIOError:
+            return Arrival()
+        except OSError:
+            data = b""
+        if not data:
+            self._hang_up()
+        return Arrival(data=data, left_after=not data)
+
+    def _accept(self) -> None:
+        # A client may be gone again before it is accepted.
+        with suppress(OSError):
+            client, (host, port, *_) = self._listener.accept()
+            if self._client is None:
+                _prepare(client)
+                self._client = client
+            else:
+                client.close()
+                self._warn(f"a second client ({host}, port {port}) was turned away: {self.name} serves one at a time")
+
+    def _hang_up(self) -> None:
+        if self._outbox.dropped_bytes:
+            self._warn(f"{self._outbox.dropped_bytes} bytes of replies were dropped, since nobody read them")
+        self._outbox.clear()
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+
+
+def _prepare(client: socket.socket) -> None:
+    client.setblocking(False)
+    client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    # A client whose machine has died must not keep the table for ever.
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for option, value in (("TCP_KEEPIDLE", 10), ("TCP_KEEPINTVL", 5), ("TCP_KEEPCNT", 3)):
+        if hasattr(socket, option):  # not on every system
+            client.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)

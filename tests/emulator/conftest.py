@@ -1,0 +1,91 @@
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+PATIENCE_S = 20.0
+"""How long to wait for what should come at once: only a failing test ever does."""
+
+
+class StandIn:
+    """A running `python -m emulator`; it is ended, and must end well, when its test is over."""
+
+    def __init__(self, arguments: tuple[str, ...], stderr_path: Path) -> None:
+        self._stderr_path = stderr_path
+        with stderr_path.open("wb") as stderr:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "emulator", *arguments], stdout=subprocess.PIPE, stderr=stderr, text=True
+            )
+        self.port = self.next_line()
+
+    def next_line(self) -> str:
+        assert self.process.stdout is not None
+        return self.process.stdout.readline().rstrip("\n")
+
+    @property
+    def stderr(self) -> str:
+        return self._stderr_path.read_text()
+
+    def wait_for_words(self, words: str) -> None:
+        wait_until(lambda: words in self.stderr)
+
+    def stop(self) -> int:
+        """End the stand-in as a service manager would and return its exit status."""
+        self.process.terminate()
+        status = self.process.wait(PATIENCE_S)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+        return status
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end_s, "what should have come did not"
+        time.sleep(0.005)
+
+
+@pytest.fixture
+def stand_in(tmp_path: Path) -> Iterator[Callable[..., StandIn]]:
+    """Start stand-ins with the given arguments."""
+    started: list[StandIn] = []
+
+    def start(*arguments: str) -> StandIn:
+        started.append(StandIn(arguments, tmp_path / f"stderr{len(started)}"))
+        return started[-1]
+
+    yield start
+    for one in started:
+        assert one.stop() == 0, one.stderr
+
+
+@pytest.fixture(name="wait_until")
+def _wait_until() -> Callable[[Callable[[], bool]], None]:
+    return wait_until
+
+
+@pytest.fixture
+def warnings() -> list[str]:
+    """What a port said to the person who runs the stand-in; its `append` is the port's `warn`."""
+    return []
+
+
+@pytest.fixture
+def opened() -> Iterator[Callable[[str], int]]:
+    """Open devices as any program would, and close what is still open afterwards."""
+    descriptors: list[int] = []
+
+    def open_device(name: str) -> int:
+        descriptors.append(os.open(name, os.O_RDWR | os.O_NOCTTY))
+        return descriptors[-1]
+
+    yield open_device
+    for descriptor in descriptors:
+        try:
+            os.close(descriptor)
+        except OSError:
+            continue

@@ -1,0 +1,61 @@
+from pathlib import Path
+
+import pytest
+
+from emulator.device_link import DeviceLink
+
+DEVICE = "/dev/pts/123456"
+OTHER_DEVICE = "/dev/pts/654321"
+
+
+def test_a_link_leads_to_the_device_until_it_is_removed(tmp_path: Path) -> None:
+    path = tmp_path / "table"
+    link = DeviceLink(path, DEVICE)
+    assert path.readlink() == Path(DEVICE)
+    assert link.replaced is None
+    link.remove()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_link_that_was_left_behind_is_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "table"
+    path.symlink_to(OTHER_DEVICE)
+    link = DeviceLink(path, DEVICE)
+    assert link.replaced == OTHER_DEVICE
+    assert path.readlink() == Path(DEVICE)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_ordinary_file_is_never_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "thesis.tex"
+    path.write_text("three years of work")
+    with pytest.raises(FileExistsError, match="something else"):
+        DeviceLink(path, DEVICE)
+    assert path.read_text() == "three years of work"
+
+
+@pytest.mark.parametrize("target", ["thesis.tex", "/etc/hosts", "/dev/null", "/dev/ttyUSB0"])
+def test_a_link_to_something_else_is_never_overwritten(tmp_path: Path, target: str) -> None:
+    path = tmp_path / "table"
+    path.symlink_to(target)
+    with pytest.raises(FileExistsError):
+        DeviceLink(path, DEVICE)
+    assert path.readlink() == Path(target)
+
+
+def test_a_directory_is_never_overwritten(tmp_path: Path) -> None:
+    with pytest.raises(FileExistsError):
+        DeviceLink(tmp_path, DEVICE)
+
+
+def test_a_link_that_another_stand_in_has_taken_over_is_left_to_it(tmp_path: Path) -> None:
+    path = tmp_path / "table"
+    first = DeviceLink(path, DEVICE)
+    DeviceLink(path, OTHER_DEVICE)
+    first.remove()
+    assert path.readlink() == Path(OTHER_DEVICE)
+
+
+def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        DeviceLink(tmp_path / "none" / "table", DEVICE)
