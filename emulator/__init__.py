@@ -1,1 +1,15 @@
-"""The stand-in rotary table: firmware and plant behind a virtual serial port."""
+"""The stand-in rotary table: firmware and plant behind a virtual serial port.
+
+Importing it teaches pyserial the port `emulator://`, a private table in virtual time.
+"""
+
+import serial
+
+from emulator.config import ConfigError, TableConfig, load_config
+from emulator.status import TableStatus
+from emulator.table import Table
+
+__all__ = ["ConfigError", "Table", "TableConfig", "TableStatus", "load_config"]
+
+if __name__ not in serial.protocol_handler_packages:
+    serial.protocol_handler_packages.append(__name__)

@@ -1,0 +1,203 @@
+"""The command line of the stand-in: `python -m emulator --pty`."""
+
+import argparse
+import math
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from emulator.clock import Clock
+from emulator.config import ConfigError, TableConfig, load_config
+from emulator.port import Port
+from emulator.server import SERVED_SIGNALS, Server
+from emulator.signals import SignalWatch
+from emulator.table import Table
+from emulator.tcp_port import TcpPort, parse_address
+
+_EXAMPLE = """example:
+  python -m emulator --pty --link ./table &
+  python -m serial.tools.miniterm --eol CR ./table 9600      (or: picocom -b 9600 ./table)
+
+The first line on stdout is the port that a client opens: the device, or a URL for pyserial. SIGUSR1 is the probe's
+trigger; Ctrl-C or SIGTERM end the stand-in with status 0.
+"""
+
+if TYPE_CHECKING:
+    from emulator.control import ControlSocket
+
+
+class UsageError(Exception):
+    """The command line or its surroundings do not allow a start; the message says what to do."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message} (--help shows all options)")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the stand-in until it is told to end, and return the exit status."""
+    try:
+        options = _parse(arguments)
+        config = load_config(options.config).with_serial(
+            baud=options.baud, decimals=options.decimals, strict=options.strict_table1 or None
+        )
+        with ExitStack() as stack:
+            _serve(options, config, stack)
+    except (UsageError, ConfigError) as error:
+        _say(str(error))
+        return 2
+    return 0
+
+
+def _parse(arguments: list[str] | None) -> argparse.Namespace:
+    options = _parser().parse_args(arguments)
+    if not (options.pty or options.tcp):
+        raise UsageError("give --pty, --tcp or both (--help shows all options)")
+    if options.link and not options.pty:
+        raise UsageError("--link names a pty: give --pty with it")
+    return options
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="python -m emulator",
+        description="A stand-in rotary table behind a virtual serial port.",
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add = parser.add_argument
+    add("--pty", action="store_true", help="open a pseudo-terminal and print its device")
+    add("--link", metavar="PATH", type=Path, help="a symbolic link to the pseudo-terminal, removed at the end")
+    add("--tcp", metavar="[HOST:]PORT", type=_address, help="listen on TCP and print the URL; port 0 is any free one")
+    add("--baud", metavar="N", type=int, help="baud rate of the table (default 9600); 0: bytes take no time")
+    add("--time-scale", metavar="X", type=_positive, default=1.0, help="simulated seconds in a real one (default 1)")
+    add("--decimals", metavar="N", type=int, help="decimals of angles in replies (default 1)")
+    add("--strict-table1", action="store_true", help="no error replies: the protocol as the paper prints it")
+    add("--config", metavar="FILE", type=Path, help="TOML file with the constants of the table that differ")
+    add("--trigger-hz", metavar="F", type=_rate, default=0.0, help="rate of the probe's trigger (default 0: none)")
+    add("--control", metavar="PATH", type=Path, help="a Unix socket for python -m emulator.control_client")
+    add("--trace", metavar="FILE", type=Path, help="record every tick in a .csv or .npz file")
+    add("--seed", metavar="N", type=_seed, default=0, help="seed of all that is left to chance (default 0)")
+    return parser
+
+
+def _address(text: str) -> tuple[str, int]:
+    try:
+        return parse_address(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _positive(text: str) -> float:
+    value = _rate(text)
+    if value == 0.0:
+        raise argparse.ArgumentTypeError("it must be greater than 0")
+    return value
+
+
+def _rate(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 0 up")
+    return value
+
+
+def _seed(text: str) -> int:
+    if not (text.isascii() and text.isdigit()):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 0 up")
+    return int(text)
+
+
+def _serve(options: argparse.Namespace, config: TableConfig, stack: ExitStack) -> None:
+    """Open what was asked for, publish the ports, and serve; `stack` closes all of it in the reverse order."""
+    signals = stack.enter_context(SignalWatch(*SERVED_SIGNALS))
+    table = Table(config, seed=options.seed)
+    with _usage("--trigger-hz"):
+        table.trigger_hz = options.trigger_hz
+    ports = _open_ports(options, config, stack)
+    control = _open_control(options.control, stack) if options.control else None
+    if options.trace:
+        _start_trace(options.trace, table, config, stack)
+    clock = Clock(config.control.tick_hz, options.time_scale)
+    for port in ports:
+        print(port.name, flush=True)
+    rate = f"{config.serial.baud} baud, 8N1" if config.serial.baud else "any baud rate, 8N1"
+    _say(f"the table is ready ({rate}); Ctrl-C ends it")
+    Server(table, clock, ports, signals, control, _say).run()
+
+
+def _open_ports(options: argparse.Namespace, config: TableConfig, stack: ExitStack) -> list[Port]:
+    ports: list[Port] = []
+    if options.pty:
+        ports.append(_open_pty(options.link, config.serial.baud, stack))
+    if options.tcp:
+        host, number = options.tcp
+        with _usage(f"--tcp {host}:{number}"):
+            port = TcpPort(host, number, _say)
+        stack.callback(port.close)
+        ports.append(port)
+    return ports
+
+
+def _open_pty(link_path: Path | None, baud: int, stack: ExitStack) -> Port:
+    try:
+        # Here, since a system without ptys has not what these modules import.
+        from emulator.device_link import DeviceLink  # noqa: PLC0415  # see above
+        from emulator.pty_port import PtyPort  # noqa: PLC0415  # see above
+    except ImportError:
+        raise UsageError("--pty: this system has no pseudo-terminals; use --tcp 0 and the URL that it prints") from None
+    with _usage("--pty"):
+        port = PtyPort(baud, _say)
+    stack.callback(port.close)
+    if link_path:
+        with _usage(f"--link {link_path}"):
+            link = DeviceLink(link_path, port.name)
+        stack.callback(link.remove)
+        if link.replaced:
+            _say(f"{link_path} led to {link.replaced} and now leads to {port.name}")
+    return port
+
+
+def _open_control(path: Path, stack: ExitStack) -> "ControlSocket":
+    from emulator.control import ControlSocket  # noqa: PLC0415  # rarely asked for, and a start should be quick
+
+    with _usage(f"--control {path}"):
+        control = ControlSocket(path)
+    stack.callback(control.close)
+    return control
+
+
+def _start_trace(path: Path, table: Table, config: TableConfig, stack: ExitStack) -> None:
+    from emulator.trace import TraceWriter  # noqa: PLC0415  # rarely asked for, and a start should be quick
+
+    with _usage("--trace"):
+        trace = stack.enter_context(TraceWriter(path, config.control.tick_hz))
+    table.observer = trace.record
+
+
+@contextmanager
+def _usage(option: str) -> Iterator[None]:
+    """Turn what the system or a module refuses into a usage error that names the option."""
+    try:
+        yield
+    except OSError as error:
+        raise UsageError(f"{option}: {error.strerror or error}; choose another or free this one") from error
+    except ValueError as error:
+        raise UsageError(f"{option}: {error}") from error
+
+
+def _say(sentence: str) -> None:
+    print(f"emulator: {sentence}", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

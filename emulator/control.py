@@ -1,0 +1,230 @@
+"""The control channel: what a person or a test may do to the stand-in besides talking to it on the wire.
+
+A Unix socket, open to its owner only. A request is one line of JSON, `{"command": NAME, PARAMETER: NUMBER, ...}`; its
+answer is one line, `{"ok": true, ...}` or `{"ok": false, "error": SENTENCE}`.
+"""
+
+import errno
+import json
+import os
+import socket
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from emulator.status import TableStatus
+
+LONGEST_REQUEST = 4096
+"""Bytes in a request, its line feed included."""
+
+_BACKLOG = 16
+_OWNER_ONLY = 0o177
+"""The mask of permissions that a new socket must not have."""
+
+
+class Stand(Protocol):
+    """What commands act on: the running stand-in."""
+
+    @property
+    def time_scale(self) -> float:
+        """Simulated seconds in a real second."""
+        ...
+
+    def trigger(self) -> None:
+        """Latch the encoder at this instant."""
+        ...
+
+    def status(self) -> TableStatus:
+        """Return the table as it is at this instant."""
+        ...
+
+    def set_load_torque(self, torque_Nm: float) -> None:
+        """Load the table from now on."""
+        ...
+
+    def set_time_scale(self, time_scale: float) -> None:
+        """Run at another rate from now on."""
+        ...
+
+    def reset(self) -> None:
+        """Cut the table's power and switch it on again."""
+        ...
+
+    def quit(self) -> None:
+        """End when the present events are served."""
+        ...
+
+
+class Parameter(NamedTuple):
+    """A number that a command takes, and the closed interval that it must lie in."""
+
+    name: str
+    least: float
+    most: float
+    help: str
+
+
+class Command(NamedTuple):
+    """One verb of the control channel; `run` returns what its answer says beyond `ok`."""
+
+    help: str
+    parameters: tuple[Parameter, ...]
+    run: Callable[[Stand, Mapping[str, float]], Mapping[str, Any] | None]
+
+
+COMMANDS: Mapping[str, Command] = {
+    "trigger": Command("latch the encoder, as the probe's signal does", (), lambda stand, _: stand.trigger()),
+    "state": Command(
+        "show the table from inside: positions, speeds, motor, queues",
+        (),
+        lambda stand, _: {**stand.status()._asdict(), "time_scale": stand.time_scale},
+    ),
+    "load-torque": Command(
+        "load the table with a constant torque",
+        (
+            Parameter(
+                "torque_Nm", -1000.0, 1000.0, "torque at the table's axis in Nm; positive resists forward rotation"
+            ),
+        ),
+        lambda stand, given: stand.set_load_torque(given["torque_Nm"]),
+    ),
+    "time-scale": Command(
+        "run faster or slower than real time",
+        (Parameter("time_scale", 1e-3, 1e4, "simulated seconds in a real second"),),
+        lambda stand, given: stand.set_time_scale(given["time_scale"]),
+    ),
+    "reset": Command("cut the table's power and switch it on again", (), lambda stand, _: stand.reset()),
+    "quit": Command("end the stand-in as SIGTERM does", (), lambda stand, _: stand.quit()),
+}
+"""Every verb, in one place: the server runs them, the command-line client shows them."""
+
+
+class RequestError(ValueError):
+    """A request that cannot be carried out; the message is the answer's sentence."""
+
+
+def answer(request: bytes, stand: Stand) -> bytes:
+    """Carry out one request and return its answer; a bad request changes nothing."""
+    try:
+        command, given = _parse(request)
+    except RequestError as error:
+        return _refusal(str(error))
+    result = command.run(stand, given) or {}
+    return json.dumps({"ok": True, **result}).encode() + b"\n"
+
+
+def _parse(request: bytes) -> tuple[Command, dict[str, float]]:
+    try:
+        fields = json.loads(request)
+    except (ValueError, RecursionError):
+        raise RequestError('a request is one line of JSON, such as {"command": "state"}') from None
+    if not isinstance(fields, dict) or not isinstance(name := fields.pop("command", None), str):
+        raise RequestError('a request is a JSON object that names its command, such as {"command": "state"}')
+    if name not in COMMANDS:
+        raise RequestError(f"'{name}' is no command; there are {', '.join(COMMANDS)}")
+    command = COMMANDS[name]
+    expected = [parameter.name for parameter in command.parameters]
+    if sorted(fields) != sorted(expected):
+        raise RequestError(f"{name} takes {' and '.join(expected) or 'no parameter'}, and nothing else")
+    return command, {
+        parameter.name: _number(name, parameter, fields[parameter.name]) for parameter in command.parameters
+    }
+
+
+def _number(command: str, parameter: Parameter, value: object) -> float:
+    if isinstance(value, int | float) and not isinstance(value, bool) and parameter.least <= value <= parameter.most:
+        return float(value)
+    allowed = f"a number from {parameter.least:g} to {parameter.most:g}"
+    raise RequestError(f"{command}: {parameter.name} must be {allowed}, not {json.dumps(value)}")
+
+
+class ControlSocket:
+    """The listening end; any number of clients may be there at once.
+
+    Args:
+        path: where the socket is put. One that a stand-in which has died left behind is replaced.
+
+    Raises:
+        OSError: something else is at the path, another stand-in listens there, or it cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        _clear_stale(path)
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        # The mask, unlike a later chmod, leaves no moment in which others can connect.
+        mask = os.umask(_OWNER_ONLY)
+        try:
+            self._listener.bind(str(path))
+        except OSError:
+            self._listener.close()
+            raise
+        finally:
+            os.umask(mask)
+        self._inode = path.stat().st_ino
+        self._listener.listen(_BACKLOG)
+        self._listener.setblocking(False)
+        self._clients: dict[socket.socket, bytes] = {}
+
+    @property
+    def input_descriptors(self) -> tuple[int, ...]:
+        """What becomes readable when a client comes, goes or asks."""
+        return (self._listener.fileno(), *(client.fileno() for client in self._clients))
+
+    def serve(self, stand: Stand) -> None:
+        """Take in new clients and answer every request that has come in whole."""
+        with suppress(BlockingIOError):
+            client, _ = self._listener.accept()
+            client.setblocking(False)
+            self._clients[client] = b""
+        for client in list(self._clients):
+            if not self._serve_client(client, stand):
+                del self._clients[client]
+                client.close()
+
+    def close(self) -> None:
+        """Hang up and remove the socket, unless another has taken its place."""
+        for client in self._clients:
+            client.close()
+        self._listener.close()
+        with suppress(OSError):
+            if self.path.stat().st_ino == self._inode:
+                self.path.unlink()
+
+    def _serve_client(self, client: socket.socket, stand: Stand) -> bool:
+        """Return whether the client stays: not when it hung up, or lets its answers pile up."""
+        try:
+            data = client.recv(LONGEST_REQUEST)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+        *requests, rest = (self._clients[client] + data).split(b"\n")
+        self._clients[client] = rest
+        answers = b"".join(answer(request, stand) for request in requests)
+        too_long = len(rest) >= LONGEST_REQUEST
+        if too_long:
+            answers += _refusal(f"a request has at most {LONGEST_REQUEST} bytes and ends in a line feed")
+        try:
+            client.sendall(answers)
+        except OSError:
+            return False
+        return bool(data) and not too_long
+
+
+def _refusal(sentence: str) -> bytes:
+    return json.dumps({"ok": False, "error": sentence}).encode() + b"\n"
+
+
+def _clear_stale(path: Path) -> None:
+    """Remove a socket that nobody listens on; leave anything else alone."""
+    if not path.is_socket():
+        return
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        try:
+            probe.connect(str(path))
+        except ConnectionRefusedError:
+            path.unlink()
+        else:
+            raise OSError(errno.EADDRINUSE, "another stand-in listens there")

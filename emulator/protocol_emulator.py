@@ -1,0 +1,252 @@
+"""The pyserial port `emulator://`: a private table in the same process, in virtual time.
+
+pyserial finds this module by its name once `emulator` is imported. Time passes only in calls: `read` lets it pass until
+the bytes are there or the time-out is over, `flush` until all is sent, `clock.sleep_s` as long as it says. A look at
+`in_waiting`, or a read without waiting, that finds nothing takes one tick, so that a loop of them comes to an end.
+"""
+
+import math
+from typing import TYPE_CHECKING, Final
+from urllib.parse import parse_qsl, urlsplit
+
+import serial
+from serial.serialutil import PortNotOpenError, SerialBase, SerialException, SerialTimeoutException
+
+from emulator.config import TableConfig, load_config
+from emulator.framing import read_at_rate
+from emulator.table import Table
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
+OUTPUT_BYTES: Final = 4096
+"""What a write leaves to wait for the line, as the driver of a real port does, before it waits itself."""
+
+_URL = "emulator://[?config=PATH&seed=N&baud=N&decimals=N&strict=0|1&trigger_hz=F]"
+_OPTIONS = ("config", "seed", "baud", "decimals", "strict", "trigger_hz")
+
+
+class VirtualClock:
+    """The time of a private table, for clients that read time only from the clock of their port."""
+
+    def __init__(self, port: "Serial") -> None:
+        self._line = port
+
+    def now_s(self) -> float:
+        """Return simulated seconds since the table was switched on."""
+        return self._line.table.tick / self._line.table.config.control.tick_hz
+
+    def sleep_s(self, duration_s: float) -> None:
+        """Let simulated time pass."""
+        self._line.advance(self._line.ticks(duration_s))
+
+
+class Serial(SerialBase):
+    """A pyserial port whose other end is a table of its own.
+
+    Not for use by several threads. The table stays the same one when the port is closed and opened again.
+
+    Attributes:
+        table: the table, from the first opening on: for tests.
+        clock: its time.
+    """
+
+    table: Table
+    clock: VirtualClock
+
+    def open(self) -> None:
+        """Switch the table on at the first opening, and connect to it.
+
+        Raises:
+            SerialException: the port is open, or its URL or the settings cannot be used.
+        """
+        if self.is_open:
+            raise SerialException("Port is already open.")
+        if self.port is None:
+            raise SerialException("Port must be configured before it can be used.")
+        if getattr(self, "_table_url", None) != self.port:
+            self.table = _table_of(self.port)
+            self.clock = VirtualClock(self)
+            self._table_url = self.port
+        self._received = bytearray()
+        self._reconfigure_port()
+        self.is_open = True
+
+    def close(self) -> None:
+        """Let what was written reach the table, and go; the motion that is running goes on."""
+        if self.is_open:
+            self.flush()
+            self.table.disconnect()
+            self.is_open = False
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that can be read at once; finding none takes a tick."""
+        self._require_open()
+        if not self._received:
+            self.advance(1)
+        return len(self._received)
+
+    @property
+    def out_waiting(self) -> int:
+        """Bytes that have not reached the table."""
+        self._require_open()
+        return self.table.status().received_queue
+
+    def read(self, size: int = 1) -> bytes:
+        """Return `size` bytes, or fewer when the time-out passes first.
+
+        Raises:
+            SerialException: there is no time-out, and nothing will ever come.
+        """
+        self._require_open()
+        if self.timeout == 0 and not self._received:
+            self.advance(1)
+        deadline = self._deadline(self.timeout)
+        while len(self._received) < size and self._advance_to_byte(deadline):
+            pass
+        return self._take(size)
+
+    def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
+        """Return bytes up to and with `expected`, `size` of them at most; fewer when the time-out passes first."""
+        self._require_open()
+        deadline = self._deadline(self.timeout)
+        line = bytearray()
+        while not line.endswith(expected) and (size is None or len(line) < size):
+            if not self._received and not self._advance_to_byte(deadline):
+                break
+            line += self._take(1)
+        return bytes(line)
+
+    def write(self, b: "ReadableBuffer", /) -> int:
+        """Put bytes on the line and return their number; waits only when more are waiting there than a port holds.
+
+        Raises:
+            SerialTimeoutException: the write time-out passed first.
+        """
+        self._require_open()
+        data = bytes(memoryview(b))
+        unsent = self._at_rate(data, self.baudrate, self.table.config.serial.baud)
+        deadline = self._deadline(self.write_timeout)
+        while unsent:
+            room = OUTPUT_BYTES - self.table.status().received_queue
+            if room > 0:
+                self.table.receive(unsent[:room])
+                unsent = unsent[room:]
+            elif not self._advance_to_byte(deadline):
+                if self.write_timeout == 0:
+                    return max(0, len(data) - len(unsent))
+                raise SerialTimeoutException("Write timeout")
+        self._collect()
+        return len(data)
+
+    def flush(self) -> None:
+        """Let time pass until the table has all that was written."""
+        self._require_open()
+        while self.out_waiting:
+            self._advance_to_byte(None)
+
+    def reset_input_buffer(self) -> None:
+        """Forget what has come and was not read."""
+        self._require_open()
+        self._received.clear()
+
+    def reset_output_buffer(self) -> None:
+        """Do nothing: what was written is on the line already."""
+        self._require_open()
+
+    def advance(self, ticks: int) -> None:
+        """Let simulated time pass; replies that come in it wait to be read."""
+        self.table.advance(ticks)
+        self._collect()
+
+    def ticks(self, duration_s: float) -> int:
+        """Return the ticks that a duration takes, the last one whole."""
+        return math.ceil(duration_s * self.table.config.control.tick_hz)
+
+    # A line of three wires: what pyserial asks of the others is answered as its network ports answer it.
+
+    @property
+    def cts(self) -> bool:
+        """Clear to send: always."""
+        return True
+
+    @property
+    def dsr(self) -> bool:
+        """Data set ready: always."""
+        return True
+
+    @property
+    def ri(self) -> bool:
+        """Ring indicator: never."""
+        return False
+
+    @property
+    def cd(self) -> bool:
+        """Carrier detect: always."""
+        return True
+
+    def _update_rts_state(self) -> None: ...
+
+    def _update_dtr_state(self) -> None: ...
+
+    def _update_break_state(self) -> None: ...
+
+    def _reconfigure_port(self) -> None:
+        if self.bytesize != serial.EIGHTBITS or self.parity != serial.PARITY_NONE:
+            raise SerialException(f"{self.port}: the table talks 8N1; open it with 8 data bits and no parity")
+
+    def _require_open(self) -> None:
+        if not self.is_open:
+            raise PortNotOpenError
+
+    def _deadline(self, timeout_s: float | None) -> int | None:
+        return None if timeout_s is None else self.table.tick + self.ticks(timeout_s)
+
+    def _advance_to_byte(self, deadline: int | None) -> bool:
+        """Let time pass to the end of the next byte on the line; return False once the deadline has come."""
+        until_byte = self.table.ticks_until_byte()
+        if deadline is None:
+            if until_byte is None:
+                raise SerialException(
+                    f"{self.port}: without a time-out this read would wait for ever: nothing is coming"
+                )
+            self.advance(until_byte)
+            return True
+        left = deadline - self.table.tick
+        self.advance(left if until_byte is None else min(left, until_byte))
+        return left > 0
+
+    def _collect(self) -> None:
+        self._received += self._at_rate(self.table.transmit(), self.table.config.serial.baud, self.baudrate)
+
+    def _take(self, size: int) -> bytes:
+        data = bytes(self._received[:size])
+        del self._received[:size]
+        return data
+
+    def _at_rate(self, data: bytes, sender_baud: int, receiver_baud: int) -> bytes:
+        paced = bool(data and self.table.config.serial.baud)
+        return read_at_rate(data, sender_baud, receiver_baud) if paced else data
+
+
+def _table_of(url: str) -> Table:
+    """Return the table that a URL describes."""
+    parts = urlsplit(url)
+    options = dict(parse_qsl(parts.query, keep_blank_values=True))
+    if parts.scheme != "emulator" or parts.netloc or parts.path not in {"", "/"} or not set(options) <= set(_OPTIONS):
+        raise SerialException(f"{url} is not {_URL}")
+    try:
+        table = Table(_config_of(options), seed=int(options.get("seed", "0")))
+        table.trigger_hz = float(options.get("trigger_hz", "0"))
+    except ValueError as error:
+        raise SerialException(f"{url}: {error}; the form is {_URL}") from error
+    return table
+
+
+def _config_of(options: dict[str, str]) -> TableConfig:
+    numbers = {name: int(options[name]) for name in ("baud", "decimals") if name in options}
+    strict = options.get("strict")
+    if strict not in {None, "0", "1"}:
+        raise ValueError(f"strict is 0 or 1, not {strict}")
+    return load_config(options.get("config")).with_serial(**numbers, strict=None if strict is None else strict == "1")

@@ -1,0 +1,189 @@
+"""The running stand-in: one loop that keeps the table level with the clock and carries bytes between it and its ports.
+
+The table is advanced lazily: when a client or a signal calls, when a byte on the line is due, and every now and then
+so that there is never much to catch up with.
+"""
+
+import select
+from collections.abc import Callable, Sequence
+from itertools import chain
+from typing import TYPE_CHECKING
+
+from emulator.clock import Clock
+from emulator.port import Port
+from emulator.signals import SignalWatch
+from emulator.status import TableStatus
+from emulator.table import Table
+
+if TYPE_CHECKING:
+    from emulator.control import ControlSocket
+
+_LONGEST_SLEEP_S = 0.02
+_CATCH_UP_TICKS = 500
+_CATCH_UP_S = 0.05
+"""Longest stretch of catching up before clients are heard again."""
+_GIVE_UP_S = 0.5
+"""How far simulated time may be behind the clock before the clock is held back."""
+_LINE_BUFFER_BYTES = 4096
+"""What waits for a slow line, as in the driver of a real one; a client that sends more is made to wait."""
+_LAST_FRACTION = 1.0 - 2.0**-20
+"""The latest that an edge can be in a tick."""
+_TRIGGER_SIGNAL = "SIGUSR1"
+END_SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+SERVED_SIGNALS = (*END_SIGNALS, _TRIGGER_SIGNAL)
+
+
+class Server:
+    """Serves a table in real time, on any number of ports that are all the same wire.
+
+    Args:
+        table: the table; nobody else touches it while the server runs.
+        clock: counts the ticks that are due; at 0 when the table was switched on.
+        ports: where clients come in. Replies go to all of them.
+        signals: entered before the ports' names are published.
+        control: the control channel, if there is one.
+        warn: takes one sentence for the person who runs the stand-in.
+    """
+
+    def __init__(
+        self,
+        table: Table,
+        clock: Clock,
+        ports: Sequence[Port],
+        signals: SignalWatch,
+        control: "ControlSocket | None",
+        warn: Callable[[str], None],
+    ) -> None:
+        self._table = table
+        self._clock = clock
+        self._ports = ports
+        self._signals = signals
+        self._control = control
+        self._warn = warn
+        self._running = True
+        self._said_slow = False
+        self._leaving = False
+
+    def run(self) -> None:
+        """Serve until a signal or the control channel ends it."""
+        while self._running:
+            readable, writable = self._wait()
+            self._catch_up()
+            for port in self._ports:
+                if not writable.isdisjoint(port.output_descriptors):
+                    port.flush()
+                if not readable.isdisjoint(port.input_descriptors):
+                    self._serve_port(port)
+            if self._control and not readable.isdisjoint(self._control.input_descriptors):
+                self._control.serve(self)
+            if self._signals.descriptor in readable:
+                self._serve_signals()
+
+    @property
+    def time_scale(self) -> float:
+        """Simulated seconds in a real second."""
+        return self._clock.time_scale
+
+    def trigger(self) -> None:
+        """Latch the encoder at this instant."""
+        fraction = self._clock.now_ticks() - self._table.tick
+        self._table.trigger(min(max(fraction, 0.0), _LAST_FRACTION))
+        # The tick that the edge is in must be over before a client can ask for the latch.
+        self._table.advance(1)
+        self._send_replies()
+
+    def status(self) -> TableStatus:
+        """Return the table as it is at this instant."""
+        return self._table.status()
+
+    def set_load_torque(self, torque_Nm: float) -> None:
+        """Load the table from now on."""
+        self._table.set_load_torque(torque_Nm)
+
+    def set_time_scale(self, time_scale: float) -> None:
+        """Run at another rate from now on."""
+        self._clock.set_time_scale(time_scale)
+        self._said_slow = False
+
+    def reset(self) -> None:
+        """Cut the table's power and switch it on again."""
+        self._table.reset()
+
+    def quit(self) -> None:
+        """End `run` when the present events are served."""
+        self._running = False
+
+    def _wait(self) -> tuple[set[int], set[int]]:
+        """Return the descriptors that can be read and written, once there are any or the table is due."""
+        inputs = [self._signals.descriptor]
+        if self._control:
+            inputs += self._control.input_descriptors
+        if not self._line_is_full():
+            inputs += chain.from_iterable(port.input_descriptors for port in self._ports)
+        outputs = list(chain.from_iterable(port.output_descriptors for port in self._ports))
+        # Unlike epoll, which counts in milliseconds, select wakes in time for the next byte.
+        readable, writable, _ = select.select(inputs, outputs, [], self._sleep_s())
+        return set(readable), set(writable)
+
+    def _line_is_full(self) -> bool:
+        """Return whether clients must wait: for the bytes of one that has left, or as behind any slow line."""
+        if self._table.ticks_until_byte() is None:
+            return False
+        return self._leaving or self._table.status().received_queue >= _LINE_BUFFER_BYTES
+
+    def _sleep_s(self) -> float:
+        ticks = self._table.ticks_until_byte()
+        if ticks is None:
+            return _LONGEST_SLEEP_S
+        return min(_LONGEST_SLEEP_S, self._clock.wall_s_until(self._table.tick + ticks))
+
+    def _catch_up(self) -> None:
+        """Bring the table level with the clock, or the clock with the table when that takes too long."""
+        end_s = self._clock.wall_s() + _CATCH_UP_S
+        while (behind := int(self._clock.now_ticks()) - self._table.tick) > 0:
+            if self._clock.wall_s() > end_s:
+                self._give_up_when_far(behind)
+                return
+            self._table.advance(min(behind, _CATCH_UP_TICKS))
+            self._send_replies()
+            self._let_go()
+
+    def _give_up_when_far(self, behind: int) -> None:
+        if behind < _GIVE_UP_S * self._clock.ticks_per_wall_s:
+            return
+        self._clock.set_ticks(self._table.tick)
+        if not self._said_slow:
+            self._warn(
+                f"simulated time falls behind: this machine is busy, or too slow for time scale {self.time_scale:g}"
+            )
+            self._said_slow = True
+
+    def _serve_port(self, port: Port) -> None:
+        arrival = port.receive()
+        if arrival.left_before:
+            self._table.disconnect()
+        if arrival.data:
+            self._table.receive(arrival.data)
+            self._send_replies()
+        if arrival.left_after:
+            self._leaving = True
+            self._let_go()
+
+    def _let_go(self) -> None:
+        """Forget a client that has left, once the table has all that it sent: nothing of it may meet the next one."""
+        if self._leaving and self._table.ticks_until_byte() is None:
+            self._table.disconnect()
+            self._leaving = False
+
+    def _send_replies(self) -> None:
+        data = self._table.transmit()
+        if data and not self._leaving:
+            for port in self._ports:
+                port.send(data)
+
+    def _serve_signals(self) -> None:
+        for number in self._signals.received():
+            if number.name == _TRIGGER_SIGNAL:
+                self.trigger()
+            else:
+                self.quit()
