@@ -14,6 +14,7 @@ from protocol.errors import (
 )
 from protocol.line_buffer import LineBuffer
 from protocol.messages import VERBS, Angle, Command, ErrorCode, Ok, Refusal, Reply, Verb
+from protocol.port import Port
 
 __all__ = [
     "VERBS",
@@ -25,6 +26,7 @@ __all__ = [
     "ErrorCode",
     "LineBuffer",
     "Ok",
+    "Port",
     "PortError",
     "ProtocolMisuse",
     "Refusal",

@@ -38,6 +38,7 @@ Fate = Callable[[bytes], list[tuple[float, bytes]]]
 """What becomes of a reply: the pieces that arrive, each with its delay in seconds beyond the table's own."""
 
 BYTE_S = 10 / 9600
+PROMPT_S = 0.001
 
 
 def prompt(reply: bytes) -> list[tuple[float, bytes]]:
@@ -86,7 +87,7 @@ class VirtualClock:
 class TablePort:
     """A port in virtual time with a table behind it; `fates` are those of its first replies, later ones are prompt."""
 
-    def __init__(self, fates: Iterable[Fate] = (), *, latency_s: float = 0.001, strict: bool = False) -> None:
+    def __init__(self, fates: Iterable[Fate] = (), *, latency_s: float = PROMPT_S, strict: bool = False) -> None:
         self.clock = VirtualClock()
         self.timeout: float | None = None
         self.is_open = True
@@ -142,9 +143,10 @@ class TablePort:
             return Refusal(ErrorCode.OUT_OF_RANGE)
         return Ok()
 
-    def give_fates(self, *fates: Fate, latency_s: float = 0.001) -> None:
+    def give_fates(self, *fates: Fate) -> None:
+        """Let the next replies meet these fates, and the table be prompt from now on."""
         self._fates = iter(fates)
-        self._latency_s = latency_s
+        self._latency_s = PROMPT_S
 
 
 class MovingTablePort(TablePort):
