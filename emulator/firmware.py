@@ -11,7 +11,7 @@ A motion runs through these states:
 from typing import NamedTuple
 
 from emulator.config import TableConfig
-from emulator.fixed_point import ERROR_BITS, POSITION_BITS, SPEED_BITS, to_fixed, wrap_int32
+from emulator.fixed_point import ERROR_BITS, POSITION_BITS, SPEED_BITS, clamp, to_fixed, wrap_int32
 from emulator.pid import HOLD, RAMP, Pid, PidState, duty_max, pid, switched_off
 from emulator.pid import step as pid_step
 from emulator.profiler import Profile, Reference, at_rest, retarget
@@ -113,14 +113,14 @@ def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareStat
         passed = remaining * position_error(reference, last_count) <= 0
         if abs(remaining) <= parameters.arrival_count or passed:
             return FirmwareState(IDLE, profile, reference, counts, switched_off(regulator, measured), 0, 0)
-        demand = min(max(remaining * parameters.approach_rate, -parameters.approach_speed), parameters.approach_speed)
+        demand = clamp(remaining * parameters.approach_rate, parameters.approach_speed)
         gain_set = HOLD
         settling_ticks += 1
 
     window_demand = (demand * parameters.window_ticks) >> (SPEED_BITS - ERROR_BITS)
     regulator = pid_step(parameters.pid, regulator, gain_set, window_demand, measured)
-    driven = abs(regulator.duty) >= parameters.stall_duty
-    still_ticks = still_ticks + 1 if driven and count == last_count else 0
+    still = count == last_count and abs(regulator.duty) >= parameters.stall_duty
+    still_ticks = still_ticks + 1 if still else 0
     if still_ticks >= parameters.stall_ticks or settling_ticks >= parameters.settling_ticks:
         stands = Reference(count, 0, 0, 0, 0)
         return FirmwareState(STALLED, profile, stands, counts, switched_off(regulator, measured), 0, 0)

@@ -32,6 +32,13 @@ def wrap_int32(number: int) -> int:
     return ((number + 0x8000_0000) & 0xFFFF_FFFF) - 0x8000_0000
 
 
+def clamp(number: int, bound: int) -> int:
+    """Return `number`, or what is nearest to it within -bound..bound."""
+    if number > bound:
+        return bound
+    return max(number, -bound)
+
+
 def to_fixed(value: Fraction | float, fraction_bits: int) -> int:
     """Return the integer nearest to `value` with that many fraction bits; halves go to the even one."""
     return round(Fraction(value) * (1 << fraction_bits))

@@ -9,7 +9,7 @@ see `fixed_point`.
 from typing import NamedTuple
 
 from emulator.config import ConfigError, GainsConfig, TableConfig
-from emulator.fixed_point import ERROR_BITS, GAIN_BITS, INT32_MAX, INTEGRAL_GAIN_BITS, OUTPUT_BITS, to_fixed
+from emulator.fixed_point import ERROR_BITS, GAIN_BITS, INT32_MAX, INTEGRAL_GAIN_BITS, OUTPUT_BITS, clamp, to_fixed
 
 RAMP = 0
 HOLD = 1
@@ -92,7 +92,7 @@ def step(parameters: Pid, state: PidState, gain_set: int, demand: int, measured:
         measured: Measured speed, count/window.
     """
     gains = parameters.ramp if gain_set == RAMP else parameters.hold
-    error = min(max(demand - (measured << ERROR_BITS), -_ERROR_MAX), _ERROR_MAX)
+    error = clamp(demand - (measured << ERROR_BITS), _ERROR_MAX)
     change = (measured - state.measured) << ERROR_BITS
     direct = gains.proportional * error - gains.derivative * change
     integral = state.integral
@@ -104,6 +104,6 @@ def step(parameters: Pid, state: PidState, gain_set: int, demand: int, measured:
     output = direct + integral + growth
     if (output < top or growth < 0) and (output > -top or growth > 0):  # saturated: no further into it
         integral += growth
-    integral = min(max(integral, -top), top)
-    duty = (direct + integral + _HALF) >> OUTPUT_BITS
-    return PidState(integral, measured, gain_set, min(max(duty, -parameters.duty_max), parameters.duty_max))
+    integral = clamp(integral, top)
+    duty = clamp((direct + integral + _HALF) >> OUTPUT_BITS, parameters.duty_max)
+    return PidState(integral, measured, gain_set, duty)

@@ -81,7 +81,9 @@ def _towards(profile: Profile, speed: int, distance: int) -> tuple[int, int]:
     (v + v') / 2 + v'^2 / 2a <= distance, that is v'^2 + a (v + v') <= 2 a distance.
     """
     top_speed, acceleration, far = profile
-    fastest = max(min(speed + acceleration, top_speed), speed - acceleration)
+    fastest = speed + acceleration
+    if fastest > top_speed:
+        fastest = max(top_speed, speed - acceleration)
     if 0 <= speed <= acceleration and (2 * distance < speed or distance <= (acceleration >> 2) + 2):
         return 0, distance  # the rest of the way is shorter than a tick
     if fastest > 0 and distance < far:

@@ -188,10 +188,11 @@ class Table:
     def _advance_undisturbed(self, end: int) -> None:
         """Pass ticks in which nothing comes from outside; a state that repeats itself stays to the end."""
         constants, torque_Nm, state = self._constants, self._load_torque_Nm, self._state
-        while self.tick < end and not self._resting:
+        for _ in range(end - self.tick):
+            if self._resting:
+                break
             before = state
             state = step(constants, before, torque_Nm)
-            self.tick += 1
             if state.firmware.motion in (IDLE, STALLED):
                 self._resting = state == before
         self._state, self.tick = state, end

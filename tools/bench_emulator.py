@@ -1,0 +1,215 @@
+"""What the stand-in costs, beside peers that run in the same minute on the same machine."""
+
+import os
+import resource
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TextIO
+
+import control
+import numpy as np
+
+from emulator import batch
+from emulator.config import TableConfig, load_config
+from emulator.interpreter import Interpreter
+from emulator.table import Table
+from emulator.tick import TableConstants, TableState
+from tools.timing import median_s, percentile, print_table
+
+EXCHANGES = 2000
+
+
+def bench_emulator(stream: TextIO) -> None:
+    """Print every figure of the stand-in."""
+    _bench_simulation(stream)
+    _bench_growth(stream)
+    _bench_round_trip(stream)
+    _bench_start(stream)
+    _bench_idle(stream)
+
+
+def _bench_simulation(stream: TextIO) -> None:
+    config = load_config()
+    interpreted_s, compiled_s, control_s = 2.0, 1000.0, 100.0
+    speeds = {
+        "emulator, compiled (full physics)": compiled_s / median_s(lambda: _run_compiled(config, compiled_s)),
+        "emulator, interpreted (full physics)": interpreted_s
+        / median_s(lambda: _run_interpreted(config, interpreted_s)),
+        "python-control, linear loop": control_s / median_s(_linear_loop(config, control_s)),
+    }
+    peer = speeds["python-control, linear loop"]
+    rows = [(name, f"{speed:,.0f} x", f"{speed / peer:,.1f}") for name, speed in speeds.items()]
+    header = ("one long motion, ticks of 1 ms, one core", "real time", "over the peer")
+    print_table(stream, "Simulation", header, rows)
+
+
+def _bench_growth(stream: TextIO) -> None:
+    config = load_config()
+    rows = []
+    for simulated_s in (10.0, 100.0, 1000.0, 10_000.0):
+        wall_s = median_s(lambda duration=simulated_s: _run_compiled(config, duration), runs=3)  # type: ignore[misc]  # a default argument
+        rows.append((f"compiled, {simulated_s:,.0f} s in motion", f"{wall_s / simulated_s * 1e6:.2f}", _peak_memory()))
+    for simulated_s in (10.0, 100.0):
+        wall_s = median_s(lambda duration=simulated_s: _run_interpreted(config, duration), runs=1)  # type: ignore[misc]  # a default argument
+        rows.append(
+            (f"interpreted, {simulated_s:,.0f} s in motion", f"{wall_s / simulated_s * 1e6:.0f}", _peak_memory())
+        )
+    table, start = Table(config), time.perf_counter()
+    for _ in range(24):
+        table.receive(b"R 90\r")
+        table.advance(3600 * config.control.tick_hz)
+    wall_s = time.perf_counter() - start
+    rows.append(("a day with 24 motions, interpreted", f"{wall_s / 86_400 * 1e6:.2f}", _peak_memory()))
+    print_table(stream, "Growth", ("simulated time", "us of work per s", "peak memory"), rows)
+
+
+def _bench_round_trip(stream: TextIO) -> None:
+    with _raw_echo() as (path, _):
+        echo = _round_trips(path)
+    with _stand_in("--pty", "--baud", "0") as (path, _):
+        ours = _round_trips(path)
+    rows = [
+        (name, f"{percentile(times, 0.5) * 1e3:.3f} ms", f"{percentile(times, 0.99) * 1e3:.3f} ms")
+        for name, times in (("raw pty echo, in one process", echo), ("H, stand-in in its own process", ours))
+    ]
+    ratios = [f"{percentile(ours, share) / percentile(echo, share):.1f}" for share in (0.5, 0.99)]
+    rows.append(("ratio", ratios[0], ratios[1]))
+    print_table(stream, "Command round trip, pacing off", ("exchange", "p50", "p99"), rows)
+
+
+def _bench_start(stream: TextIO) -> None:
+    def ready(command: list[str]) -> Callable[[], None]:
+        def run() -> None:
+            with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+                assert process.stdout is not None
+                process.stdout.readline()
+                process.send_signal(signal.SIGTERM)
+
+        return run
+
+    ours = median_s(ready([sys.executable, "-m", "emulator", "--pty"]))
+    bare = median_s(ready([sys.executable, "-c", "print(flush=True); import time; time.sleep(9)"]))
+    rows = [("python, first line", f"{bare:.3f} s"), ("python -m emulator --pty, first line", f"{ours:.3f} s")]
+    print_table(stream, "Start to ready", ("program", "median"), rows)
+
+
+def _bench_idle(stream: TextIO) -> None:
+    with _stand_in("--pty") as (_, process):
+        time.sleep(0.5)
+        before, start = _cpu_s(process.pid), time.perf_counter()
+        time.sleep(4.0)
+        share = (_cpu_s(process.pid) - before) / (time.perf_counter() - start)
+    print_table(
+        stream, "Idle in real time", ("program", "share of a core"), [("stand-in, table at rest", f"{share:.1%}")]
+    )
+
+
+def _long_motion(config: TableConfig) -> tuple[TableConstants, TableState, batch.Motions]:
+    table = Table(config)
+    registers = Interpreter(config).power_on()
+    snapshot = table.snapshot()
+    far = 2**31 - 1 << 26
+    motions = np.array([[0, batch.MOVE_BY, far, registers.speed, registers.acceleration]], dtype=np.int64)
+    return snapshot.constants, snapshot.state, motions
+
+
+def _run_compiled(config: TableConfig, simulated_s: float) -> None:
+    constants, state, motions = _long_motion(config)
+    ticks = round(simulated_s * config.control.tick_hz)
+    batch.run(constants, state, ticks, motions, every=ticks)
+
+
+def _run_interpreted(config: TableConfig, simulated_s: float) -> None:
+    table = Table(config.with_serial(baud=0))
+    table.receive(b"R 100000\r")
+    table.advance(round(simulated_s * config.control.tick_hz))
+
+
+def _linear_loop(config: TableConfig, simulated_s: float) -> Callable[[], object]:
+    """Return the peer: motor and PI in python-control, without friction, gears, quantisation or protocol."""
+    motor, tick_s = config.motor, 1.0 / config.control.tick_hz
+    inertia = motor.rotor_inertia_kg_m2 + config.gears.inertia_kg_m2
+    plant = control.ss(
+        [
+            [-motor.resistance_ohm / motor.inductance_H, -motor.torque_constant_Nm_A / motor.inductance_H],
+            [motor.torque_constant_Nm_A / inertia, 0.0],
+        ],
+        [[config.driver.supply_V / motor.inductance_H], [0.0]],
+        [[0.0, np.degrees(1.0) / config.gears.ratio]],
+        0.0,
+    )
+    gains = config.gains.hold
+    gain, integral_s = gains.proportional_duty_s_deg, gains.integral_time_s
+    regulator = control.tf([gain * (1 + tick_s / integral_s), -gain], [1, -1], tick_s)
+    loop = control.ss(control.feedback(control.sample_system(plant, tick_s) * control.ss(regulator)))
+    times = np.arange(round(simulated_s / tick_s)) * tick_s
+    demand = np.minimum(20.0 * times, 10.0)
+    return lambda: control.forced_response(loop, times, demand)
+
+
+def _round_trips(path: str) -> list[float]:
+    port = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    try:
+        durations = []
+        for _ in range(EXCHANGES):
+            start = time.perf_counter()
+            os.write(port, b"H\r")
+            reply = b""
+            while not reply.endswith(b"\r"):
+                reply += os.read(port, 64)
+            durations.append(time.perf_counter() - start)
+        return durations
+    finally:
+        os.close(port)
+
+
+@contextmanager
+def _raw_echo() -> Iterator[tuple[str, None]]:
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    stop_read, stop_write = os.pipe()
+
+    def echo() -> None:
+        while True:
+            ready, _, _ = select.select([master, stop_read], [], [])
+            if stop_read in ready:
+                return
+            os.write(master, os.read(master, 64))
+
+    thread = threading.Thread(target=echo)
+    thread.start()
+    try:
+        yield os.ttyname(slave), None
+    finally:
+        os.write(stop_write, b"x")
+        thread.join()
+        for descriptor in (master, slave, stop_read, stop_write):
+            os.close(descriptor)
+
+
+@contextmanager
+def _stand_in(*arguments: str) -> Iterator[tuple[str, "subprocess.Popen[str]"]]:
+    command = [sys.executable, "-m", "emulator", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        assert process.stdout is not None
+        try:
+            yield process.stdout.readline().strip(), process
+        finally:
+            process.terminate()
+
+
+def _cpu_s(pid: int) -> float:
+    user, system = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
+
+def _peak_memory() -> str:
+    return f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB"
