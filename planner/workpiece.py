@@ -5,23 +5,11 @@ up; a workpiece of given dimensions stands on z = 0 with its middle on the axis,
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import trimesh
 
 from planner.errors import WorkpieceError
-
-
-class WorkpieceClass(Protocol):
-    """What all classes share."""
-
-    @property
-    def middle_mm(self) -> tuple[float, float, float]:
-        """Middle of the base in frame W."""
-
-    def mesh(self) -> trimesh.Trimesh:
-        """Return the closed surface in frame W."""
 
 
 @dataclass(frozen=True)
@@ -137,11 +125,9 @@ class Mould:
         return cls(length, width, height, left + right, front + back, depth, middle)
 
 
-CLASSES: dict[str, type[Sphere] | type[Cylinder] | type[Mould]] = {
-    "cylinder": Cylinder,
-    "mould": Mould,
-    "sphere": Sphere,
-}
+Workpiece = Sphere | Cylinder | Mould
+
+CLASSES: dict[str, type[Workpiece]] = {"cylinder": Cylinder, "mould": Mould, "sphere": Sphere}
 
 
 def _box(mesh: trimesh.Trimesh) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

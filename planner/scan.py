@@ -1,0 +1,242 @@
+"""A scan problem: cell, workpiece, path, limits and weights, read from one TOML file.
+
+Keys carry their units; placements are x y z in mm and yaw pitch roll in degrees. Files named in a scan file are
+looked for beside it.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from planner.arm import Arm
+from planner.arrays import FloatArray
+from planner.cell import Cell, Probe, Table, placement
+from planner.errors import PlannerError, ScanFileError, WorkpieceError
+from planner.mesh import load_mesh, radius_about_axis_mm
+from planner.patterns import PATTERNS, Coverage
+from planner.scan_path import ScanPath, at_scan_speed, load_scan_path
+from planner.toml_table import TomlTable
+from planner.workpiece import CLASSES, Workpiece
+
+_SHIPPED = Path(__file__).parent / "scans"
+# A workpiece may touch the table, and a mesh's base need not be ground flat.
+_BASE_TOLERANCE_MM = 0.5
+
+
+@dataclass(frozen=True)
+class TableLimits:
+    """What the table's controller allows; the defaults are those of the stand-in."""
+
+    speed_deg_s: float = 40.0
+    acceleration_deg_s2: float = 100.0
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the value function and of the cost of a path.
+
+    Attributes:
+        k_a: Weight of the squared table acceleration in Eq. (5), (deg/s2)^-2.
+        k_w: Weight of the squared table speed in Eq. (5), (deg/s)^-2.
+        gamma: Exponents of Eq. (1), one per joint; a greater one keeps the joint nearer the middle of its range.
+        wrist_singularity_deg: Angle between the axes of joints 4 and 6 below which a pose is forbidden.
+        minimum_clearance_mm: Clearance below which a pose is forbidden.
+        comfort_clearance_mm: Clearance from which on nearness no longer lowers the value.
+    """
+
+    k_a: float
+    k_w: float
+    gamma: tuple[float, ...] = (0.2,) * 6
+    wrist_singularity_deg: float = 8.0
+    minimum_clearance_mm: float = 5.0
+    comfort_clearance_mm: float = 40.0
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Everything that a configuration map and a plan need.
+
+    Attributes:
+        name: The scan file's name without its ending.
+        cell: Arm, table and probe.
+        mesh: The workpiece's closed surface in frame W, mm.
+        path: Where the probe must be.
+        limits: The table's limits.
+        weights: Weights of value and cost.
+        workpiece: The workpiece's class and dimensions; None for a mesh whose path comes from a file.
+    """
+
+    name: str
+    cell: Cell
+    mesh: trimesh.Trimesh = field(repr=False)
+    path: ScanPath = field(repr=False)
+    limits: TableLimits
+    weights: Weights
+    workpiece: Workpiece | None = None
+
+
+def shipped_scans() -> list[str]:
+    """Return the names of the scans that come with the planner."""
+    return sorted(file.stem for file in _SHIPPED.glob("*.toml"))
+
+
+def load_scan(scan: str | Path) -> Scan:
+    """Return the scan of a TOML file, or a shipped one by its name.
+
+    Raises:
+        PlannerError: A file cannot be read, or holds a key, value or shape that is not allowed; the message names it.
+    """
+    shipped = _SHIPPED / f"{scan}.toml"
+    file = shipped if shipped.is_file() else Path(scan)
+    if not file.is_file():
+        raise ScanFileError(f"{scan} is neither a scan file nor one of the shipped scans {', '.join(shipped_scans())}")
+    top = TomlTable.load(file)
+    with _named(file):
+        cell = _read_cell(top.table("cell"), file.parent)
+        workpiece, mesh = _read_workpiece(top.table("workpiece"), file.parent)
+        _check_it_fits_the_table(mesh, cell)
+        path = _read_path(top.table("path"), file.parent, cell.probe, workpiece)
+        limits = _read_limits(top.table("limits"))
+        weights = _read_weights(top.table("weights"), limits)
+    top.finish()
+    return Scan(file.stem, cell, mesh, path, limits, weights, workpiece)
+
+
+@contextmanager
+def _named(file: Path) -> Iterator[None]:
+    """Put the scan file's name before messages that do not know it."""
+    try:
+        yield
+    except ScanFileError:
+        raise
+    except PlannerError as error:
+        raise type(error)(f"{file}: {error}") from error
+
+
+def _read_cell(section: TomlTable, folder: Path) -> Cell:
+    arm = section.text("arm", "viper_s650")
+    beside = folder / arm
+    placed = {
+        name: _placement(section, key)
+        for name, key in (("T_BT", "table_in_base"), ("T_TW", "workpiece_on_table"), ("T_FS", "probe_on_flange"))
+        if key in section
+    }
+    table, probe = _read_table(section.table("table")), _read_probe(section.table("probe"))
+    section.finish()
+    return Cell(arm=Arm.load(beside if beside.is_file() else arm), table=table, probe=probe, **placed)
+
+
+def _placement(section: TomlTable, key: str) -> FloatArray:
+    return placement(*section.numbers(key, 6))
+
+
+def _read_table(section: TomlTable) -> Table:
+    table = Table(
+        **{item.name: section.number(item.name, getattr(Table, item.name), above=0.0) for item in fields(Table)}
+    )
+    section.finish()
+    return table
+
+
+def _read_probe(section: TomlTable) -> Probe:
+    nearest = section.number("nearest_mm", Probe.nearest_mm, above=0.0)
+    farthest = section.number("farthest_mm", Probe.farthest_mm, above=nearest)
+    x, y, z = section.numbers("body_mm", 3, Probe.body_mm)
+    if min(x, y, z) <= 0.0:
+        raise section.refuse("body_mm", "three numbers above 0")
+    probe = Probe(
+        stand_off_mm=section.number("stand_off_mm", Probe.stand_off_mm, at_least=nearest, at_most=farthest),
+        nearest_mm=nearest,
+        farthest_mm=farthest,
+        line_width_mm=section.number("line_width_mm", Probe.line_width_mm, above=0.0),
+        body_mm=(x, y, z),
+    )
+    section.finish()
+    return probe
+
+
+def _read_workpiece(section: TomlTable, folder: Path) -> tuple[Workpiece | None, trimesh.Trimesh]:
+    if "mesh" in section:
+        mesh = load_mesh(folder / section.text("mesh"))
+        kind = section.choice("class", (*CLASSES, "other"), "other")
+        section.finish()
+        return (CLASSES[kind].measured(mesh) if kind != "other" else None), mesh
+    shape = CLASSES[section.choice("class", tuple(CLASSES))]
+    sizes = [item.name for item in fields(shape) if item.name != "middle_mm"]
+    workpiece = shape(**{size: section.number(size, above=0.0) for size in sizes})
+    section.finish()
+    return workpiece, workpiece.mesh()
+
+
+def _check_it_fits_the_table(mesh: trimesh.Trimesh, cell: Cell) -> None:
+    reach_mm = radius_about_axis_mm(mesh, cell.T_TW)
+    if reach_mm > cell.table.radius_mm:
+        raise WorkpieceError(
+            f"the workpiece reaches {reach_mm:.1f} mm from the table's axis;"
+            f" it must stay within the table's radius of {cell.table.radius_mm:g} mm"
+        )
+    lowest_mm = float((np.asarray(mesh.vertices) @ cell.T_TW[2, :3]).min() + cell.T_TW[2, 3])
+    if lowest_mm < -_BASE_TOLERANCE_MM:
+        raise WorkpieceError(f"the workpiece reaches {-lowest_mm:.1f} mm below the table's top; it must stand on it")
+
+
+def _read_path(section: TomlTable, folder: Path, probe: Probe, workpiece: Workpiece | None) -> ScanPath:
+    step_s = section.number("time_step_s", above=0.0)
+    if "file" in section:
+        file = folder / section.text("file")
+        section.finish()
+        return load_scan_path(file, step_s)
+    if workpiece is None:
+        raise section.refuse("file", "a path file, because the workpiece has no class with predefined patterns")
+    patterns = PATTERNS[type(workpiece).__name__.lower()]
+    pattern = patterns[section.choice("pattern", tuple(patterns))]
+    speed_mm_s = section.number("scan_speed_mm_s", above=0.0)
+    coverage = _read_coverage(section)
+    section.finish()
+    waypoints = pattern(workpiece, probe, coverage)
+    return at_scan_speed(waypoints, speed_mm_s, step_s, probe.stand_off_mm, probe.line_width_mm)
+
+
+def _read_coverage(section: TomlTable) -> Coverage:
+    top_polar_deg = section.number("top_polar_deg", Coverage.top_polar_deg, at_least=0.0, at_most=170.0)
+    return Coverage(
+        overlap=section.number("overlap", Coverage.overlap, at_least=0.0, at_most=0.9),
+        top_polar_deg=top_polar_deg,
+        lowest_polar_deg=section.number(
+            "lowest_polar_deg", Coverage.lowest_polar_deg, above=top_polar_deg, at_most=180.0
+        ),
+        bottom_margin_mm=section.number("bottom_margin_mm", Coverage.bottom_margin_mm, at_least=0.0),
+        tilt_deg=section.number("tilt_deg", Coverage.tilt_deg, at_least=0.0, at_most=60.0),
+    )
+
+
+def _read_limits(section: TomlTable) -> TableLimits:
+    limits = TableLimits(
+        speed_deg_s=section.number("table_speed_deg_s", TableLimits.speed_deg_s, above=0.0),
+        acceleration_deg_s2=section.number("table_acceleration_deg_s2", TableLimits.acceleration_deg_s2, above=0.0),
+    )
+    section.finish()
+    return limits
+
+
+def _read_weights(section: TomlTable, limits: TableLimits) -> Weights:
+    gamma = section.numbers("gamma", 6, Weights.gamma)
+    if min(gamma) < 0.0:
+        raise section.refuse("gamma", "a list of 6 numbers at least 0")
+    minimum_mm = section.number("minimum_clearance_mm", Weights.minimum_clearance_mm, at_least=0.0)
+    weights = Weights(
+        k_a=section.number("k_a", 0.1 / limits.acceleration_deg_s2**2, at_least=0.0),
+        k_w=section.number("k_w", 0.1 / limits.speed_deg_s**2, at_least=0.0),
+        gamma=gamma,
+        wrist_singularity_deg=section.number(
+            "wrist_singularity_deg", Weights.wrist_singularity_deg, at_least=0.0, at_most=90.0
+        ),
+        minimum_clearance_mm=minimum_mm,
+        comfort_clearance_mm=section.number("comfort_clearance_mm", Weights.comfort_clearance_mm, above=minimum_mm),
+    )
+    section.finish()
+    return weights
