@@ -1,6 +1,8 @@
 """The shape of the whole: imports run one way, and clocks, ports and threads stay at the edge."""
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -40,6 +42,22 @@ PROTOCOL_EDGE = {
     "protocol/clock.py": {"time"},
 }
 
+EMULATOR_EDGE = {
+    "__main__",
+    "clock",
+    "config",
+    "control",
+    "control_client",
+    "device_link",
+    "inotify",
+    "pty_port",
+    "server",
+    "signals",
+    "tcp_port",
+    "terminal_baud",
+    "trace",
+}
+
 
 def imported_packages(source: Path) -> Iterator[str]:
     """Yield the top-level name of each import, those inside functions included."""
@@ -59,10 +77,24 @@ def test_imports_run_one_way(package: str) -> None:
     assert wrong == []
 
 
-def test_the_protocol_touches_clock_and_port_at_its_edge_only() -> None:
-    touched = {
+def touched_at_the_edge(package: str) -> dict[str, set[str]]:
+    return {
         source.relative_to(ROOT).as_posix(): edge
-        for source in (ROOT / "protocol").glob("*.py")
+        for source in (ROOT / package).glob("*.py")
         if (edge := EDGE_MODULES.intersection(imported_packages(source)))
     }
-    assert touched == PROTOCOL_EDGE
+
+
+def test_the_protocol_touches_clock_and_port_at_its_edge_only() -> None:
+    assert touched_at_the_edge("protocol") == PROTOCOL_EDGE
+
+
+def test_the_emulator_touches_clock_ports_and_files_at_its_edge_only() -> None:
+    touched = {Path(source).stem for source in touched_at_the_edge("emulator")}
+    assert touched - {"__init__", "protocol_emulator"} <= EMULATOR_EDGE  # those two only teach pyserial a port
+
+
+def test_the_stand_in_starts_with_neither_numpy_nor_numba() -> None:
+    program = "import sys, emulator.__main__; print(*({'numpy', 'numba', 'scipy'} & sys.modules.keys()))"
+    result = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == ""
