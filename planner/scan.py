@@ -166,8 +166,8 @@ def _read_workpiece(section: TomlTable, folder: Path) -> tuple[Workpiece | None,
         section.finish()
         return (CLASSES[kind].measured(mesh) if kind != "other" else None), mesh
     shape = CLASSES[section.choice("class", tuple(CLASSES))]
-    sizes = [item.name for item in fields(shape) if item.name != "middle_mm"]
-    workpiece = shape(**{size: section.number(size, above=0.0) for size in sizes})
+    names = [item.name for item in fields(shape) if item.name != "middle_mm"]
+    workpiece = shape(middle_mm=(0.0, 0.0, 0.0), **{name: section.number(name, above=0.0) for name in names})
     section.finish()
     return workpiece, workpiece.mesh()
 
