@@ -5,7 +5,8 @@ right round towards minus infinity, as an arithmetic shift does on the controlle
 
 | quantity | unit | fraction bits | register |
 |---|---|---|---|
-| position, distance | encoder count | 0, and a second word of 26 | 32 + 26 |
+| position | encoder count | 0, and a second word of 26 | 32 + 26 |
+| distance | encoder count | 0, and a second word of 26 | 38 + 26: braking may lead far away from the target |
 | speed | count/tick | 26 | 32, so less than 32 counts a tick |
 | acceleration | count/tick^2 | 26 | 32 |
 | speed error | count/window | 8 | 32 |
