@@ -70,10 +70,14 @@ def sphere_meridians(sphere: Sphere, probe: Probe, coverage: Coverage) -> FloatA
 
 
 def sphere_spiral(sphere: Sphere, probe: Probe, coverage: Coverage) -> FloatArray:
-    """Return a spiral from the pole down that sinks one strip per turn, the line along the meridian."""
+    """Return a spiral from the pole down that sinks one strip per turn, the line along the meridian.
+
+    It begins and ends in a full turn at one polar angle, or else a wedge at either end would be left out.
+    """
     turn_deg = math.degrees(coverage.pitch_mm(probe.line_width_mm) / (0.5 * sphere.diameter_mm))
-    turns = (coverage.lowest_polar_deg - coverage.top_polar_deg) / turn_deg
-    corners = [(coverage.top_polar_deg, 0.0), (coverage.lowest_polar_deg, 360.0 * turns)]
+    top, lowest = coverage.top_polar_deg, coverage.lowest_polar_deg
+    turns = (lowest - top) / turn_deg
+    corners = [(top, 0.0), (top, 360.0), (lowest, 360.0 * (turns + 1.0)), (lowest, 360.0 * (turns + 2.0))]
     polar, azimuth = np.radians(_filled(corners).T)
     down = np.column_stack((np.cos(polar) * np.cos(azimuth), np.cos(polar) * np.sin(azimuth), -np.sin(polar)))
     return _on_sphere(sphere, probe, polar, azimuth, down)
@@ -94,10 +98,15 @@ def cylinder_rings(cylinder: Cylinder, probe: Probe, coverage: Coverage) -> Floa
 
 
 def cylinder_helix(cylinder: Cylinder, probe: Probe, coverage: Coverage) -> FloatArray:
-    """Return a helix from the bottom up that climbs at most one strip per turn."""
+    """Return a helix from the bottom up that climbs one strip per turn.
+
+    It begins and ends in a full turn at one height, or else a wedge at either end would be left out.
+    """
     heights = _ring_heights(cylinder, probe, coverage)
-    turns = max(1, len(heights) - 1)
-    return _on_cylinder(cylinder, probe, [(0.0, heights[0]), (360.0 * turns, heights[-1])])
+    bottom, top, turns = heights[0], heights[-1], len(heights) - 1
+    return _on_cylinder(
+        cylinder, probe, [(0.0, bottom), (360.0, bottom), (360.0 * (turns + 1), top), (360.0 * (turns + 2), top)]
+    )
 
 
 def _ring_heights(cylinder: Cylinder, probe: Probe, coverage: Coverage) -> FloatArray:

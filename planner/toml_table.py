@@ -1,0 +1,127 @@
+"""Read a TOML file key by key, and refuse what nobody asked for.
+
+Every refusal names the file, the key, its value and what is allowed: a typing error in a configuration must
+never be a silent default.
+"""
+
+import math
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from planner.errors import ScanFileError
+
+
+class TomlTable:
+    """One table of a TOML file, which remembers the keys that were read."""
+
+    def __init__(self, file: Path, values: dict[str, Any], prefix: str = "") -> None:
+        self.file = file
+        self._values = values
+        self._prefix = prefix
+        self._read: set[str] = set()
+
+    @classmethod
+    def load(cls, file: Path) -> Self:
+        """Return the top table of `file`.
+
+        Raises:
+            ScanFileError: The file cannot be read or is not TOML.
+        """
+        try:
+            return cls(file, tomllib.loads(file.read_text(encoding="utf-8")))
+        except OSError as error:
+            raise ScanFileError(f"{file}: cannot be read ({error.strerror or error})") from error
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ScanFileError(f"{file}: not a TOML file: {error}") from error
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._values
+
+    def refuse(self, key: str, allowed: str) -> ScanFileError:
+        """Return the error that says that the value of `key` is not what is allowed."""
+        if key not in self._values:
+            return ScanFileError(f"{self.file}: {self._prefix}{key} is missing; it must be {allowed}")
+        return ScanFileError(f"{self.file}: {self._prefix}{key} is {self._values[key]!r}; it must be {allowed}")
+
+    def _take(self, key: str, default: object = None) -> Any:  # noqa: ANN401 - any type until it is checked
+        self._read.add(key)
+        return self._values.get(key, default)
+
+    def number(
+        self,
+        key: str,
+        default: float | None = None,
+        *,
+        above: float = -math.inf,
+        at_least: float = -math.inf,
+        at_most: float = math.inf,
+    ) -> float:
+        """Return the finite number `key` in (above, at_most] and [at_least, at_most]; required without a default."""
+        value = self._take(key, default)
+        if not _is_number(value) or not (value > above and at_least <= value <= at_most):
+            raise self.refuse(key, _range_text(above, at_least, at_most))
+        return float(value)
+
+    def numbers(self, key: str, count: int, default: Sequence[float] | None = None) -> tuple[float, ...]:
+        """Return the list `key` of `count` finite numbers; required without a default."""
+        value = self._take(key, default)
+        is_list = isinstance(value, list | tuple) and len(value) == count
+        if not is_list or not all(map(_is_number, value)):
+            raise self.refuse(key, f"a list of {count} finite numbers")
+        return tuple(map(float, value))
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """Return the text `key`; required without a default."""
+        value = self._take(key, default)
+        if not isinstance(value, str) or not value:
+            raise self.refuse(key, "a text")
+        return value
+
+    def choice(self, key: str, choices: Sequence[str], default: str | None = None) -> str:
+        """Return the text `key`, which is one of `choices`; required without a default."""
+        value = self._take(key, default)
+        if value not in choices:
+            raise self.refuse(key, "one of " + ", ".join(choices))
+        return str(value)
+
+    def table(self, key: str) -> "TomlTable":
+        """Return the table `key`; an absent one is empty."""
+        value = self._take(key, {})
+        if not isinstance(value, dict):
+            raise self.refuse(key, "a table")
+        return TomlTable(self.file, value, f"{self._prefix}{key}.")
+
+    def tables(self, key: str, count: int) -> list["TomlTable"]:
+        """Return the `count` tables of the list `key`."""
+        value = self._take(key)
+        if not isinstance(value, list) or len(value) != count or not all(isinstance(item, dict) for item in value):
+            raise self.refuse(key, f"a list of {count} tables")
+        return [TomlTable(self.file, item, f"{self._prefix}{key}[{i + 1}].") for i, item in enumerate(value)]
+
+    def finish(self) -> None:
+        """Refuse keys that nothing has read.
+
+        Raises:
+            ScanFileError: One such key, with those that are known here.
+        """
+        for key in self._values:
+            if key not in self._read:
+                known = ", ".join(sorted(self._read))
+                raise ScanFileError(f"{self.file}: {self._prefix}{key} is not a known key; known are {known}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _range_text(above: float, at_least: float, at_most: float) -> str:
+    bounds = []
+    if above > -math.inf:
+        bounds.append(f"above {above:g}")
+    if at_least > -math.inf:
+        bounds.append(f"at least {at_least:g}")
+    if at_most < math.inf:
+        bounds.append(f"at most {at_most:g}")
+    return "a finite number" + (" " + " and ".join(bounds) if bounds else "")
