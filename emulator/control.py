@@ -175,9 +175,10 @@ class ControlSocket:
     def serve(self, stand: Stand) -> None:
         """Take in new clients and answer every request that has come in whole."""
         with suppress(BlockingIOError):
-            client, _ = self._listener.accept()
-            client.setblocking(False)
-            self._clients[client] = b""
+            while True:
+                client, _ = self._listener.accept()
+                client.setblocking(False)
+                self._clients[client] = b""
         for client in list(self._clients):
             if not self._serve_client(client, stand):
                 del self._clients[client]

@@ -30,8 +30,8 @@ def request(path: Path, command: str, **parameters: float) -> dict[str, Any]:
     line = json.dumps({"command": command, **parameters}).encode() + b"\n"
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-            connection.settimeout(_TIMEOUT_S)
             connection.connect(str(path))
+            connection.settimeout(_TIMEOUT_S)
             connection.sendall(line)
             with connection.makefile("rb") as replies:
                 reply = replies.readline()

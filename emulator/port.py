@@ -22,6 +22,11 @@ class Port(Protocol):
     """What a client opens."""
 
     @property
+    def client_count(self) -> int:
+        """Clients that are there, as of the last `receive`."""
+        ...
+
+    @property
     def input_descriptors(self) -> tuple[int, ...]:
         """What becomes readable when `receive` has something to return."""
         ...

@@ -51,6 +51,11 @@ class PtyPort:
         self._outbox = Outbox()
 
     @property
+    def client_count(self) -> int:
+        """Programs that have the device open, where the system tells."""
+        return self._clients
+
+    @property
     def input_descriptors(self) -> tuple[int, ...]:
         """What becomes readable when a client comes, goes or sends."""
         return (self._server,) if self._watch is None else (self._server, self._watch.descriptor)

@@ -62,6 +62,7 @@ class Server:
         self._warn = warn
         self._running = True
         self._said_slow = False
+        self._said_two = False
         self._leaving = False
 
     def run(self) -> None:
@@ -160,6 +161,7 @@ class Server:
 
     def _serve_port(self, port: Port) -> None:
         arrival = port.receive()
+        self._warn_of_two()
         if arrival.left_before:
             self._table.disconnect()
         if arrival.data:
@@ -168,6 +170,12 @@ class Server:
         if arrival.left_after:
             self._leaving = True
             self._let_go()
+
+    def _warn_of_two(self) -> None:
+        busy = [port.name for port in self._ports if port.client_count]
+        if len(busy) > 1 and not self._said_two:
+            self._warn(f"{' and '.join(busy)} have clients at once: each hears the replies to both")
+        self._said_two = len(busy) > 1
 
     def _let_go(self) -> None:
         """Forget a client that has left, once the table has all that it sent: nothing of it may meet the next one."""

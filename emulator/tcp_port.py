@@ -49,6 +49,11 @@ class TcpPort:
         self.name = f"socket://[{host}]:{bound_port}" if ":" in host else f"socket://{host}:{bound_port}"
 
     @property
+    def client_count(self) -> int:
+        """1 while a client is connected, else 0."""
+        return int(self._client is not None)
+
+    @property
     def input_descriptors(self) -> tuple[int, ...]:
         """What becomes readable when a client comes, goes or sends."""
         listener = self._listener.fileno()

@@ -1,0 +1,108 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from emulator.config import load_config
+from emulator.table import Table
+from emulator.trace import TraceWriter, read_trace
+
+TICK_HZ = 1000
+
+
+def record(path: Path, ticks: int = 2000) -> Table:
+    table = Table(load_config())
+    with TraceWriter(path, TICK_HZ) as trace:
+        table.observer = trace.record
+        table.advance(100)
+        table.receive(b"P 3\rH\r")
+        table.advance(ticks)
+    return table
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.npz"])
+def test_a_trace_holds_the_whole_run(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    table = record(path)
+    trace = read_trace(path)
+    assert trace.time_s[-1] == table.tick / TICK_HZ
+    assert trace.encoder_deg[-1] == table.status().encoder_deg
+    assert trace.reference_deg[-1] == pytest.approx(3.0)
+    assert np.abs(trace.true_speed_deg_s).max() > 5.0
+    assert b"".join(trace.received) == b"P 3\rH\r"
+    assert b"".join(trace.transmitted) == b"OK\rH 0.0\r"
+    assert set(trace.gain_set) == {"ramp", "hold"}
+    assert {"idle", "moving"} <= set(trace.state)
+
+
+def test_both_formats_hold_the_same_to_the_last_bit(tmp_path: Path) -> None:
+    record(tmp_path / "run.csv")
+    record(tmp_path / "run.npz")
+    one, other = read_trace(tmp_path / "run.csv"), read_trace(tmp_path / "run.npz")
+    for name in one._fields:
+        assert list(getattr(one, name)) == list(getattr(other, name))
+
+
+def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
+    record(tmp_path / "one.csv")
+    record(tmp_path / "other.csv")
+    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "other.csv").read_bytes()
+
+
+def test_the_header_names_columns_with_their_units(tmp_path: Path) -> None:
+    record(tmp_path / "run.csv")
+    header = (tmp_path / "run.csv").read_text().splitlines()[0]
+    assert header.startswith("time_s,reference_deg,encoder_deg,true_deg,reference_speed_deg_s,")
+    assert header.endswith("current_A,duty,gain_set,state,received,transmitted")
+
+
+def test_every_tick_of_a_motion_is_there_and_rest_is_two_rows(tmp_path: Path) -> None:
+    record(tmp_path / "run.csv", ticks=100_000)
+    time_s = read_trace(tmp_path / "run.csv").time_s
+    steps = np.diff(time_s)
+    assert np.all(steps > 0)
+    assert np.median(steps) == pytest.approx(1 / TICK_HZ)
+    assert len(time_s) < 4000
+    assert time_s[-1] == 100.1
+
+
+def test_the_file_has_its_name_only_when_it_is_complete(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    trace = TraceWriter(path, TICK_HZ)
+    assert not path.exists()
+    trace.close()
+    assert list(tmp_path.iterdir()) == [path]
+    assert len(read_trace(path).time_s) == 0
+
+
+def test_an_older_trace_stays_until_the_new_one_is_complete(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("an older run")
+    trace = TraceWriter(path, TICK_HZ)
+    assert path.read_text() == "an older run"
+    trace.close()
+    assert path.read_text().startswith("time_s,")
+
+
+def test_any_bytes_on_the_wire_survive(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    everything = bytes(range(256)) + b'",\\r\\x00'
+    table = Table(load_config())
+    with TraceWriter(path, TICK_HZ) as trace:
+        trace.record(table.status(), everything, everything[::-1])
+    recorded = read_trace(path)
+    assert recorded.received == [everything]
+    assert recorded.transmitted == [everything[::-1]]
+
+
+def test_a_name_with_another_ending_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"\.csv or \.npz"):
+        TraceWriter(tmp_path / "run.txt", TICK_HZ)
+
+
+def test_a_file_that_is_no_trace_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
+    np.savez(tmp_path / "other.npz", a=np.zeros(3))
+    for name in ("other.csv", "other.npz"):
+        with pytest.raises(ValueError, match="is no trace"):
+            read_trace(tmp_path / name)
