@@ -82,7 +82,7 @@ def draw_trace(trace: Trace, title: str = "") -> Figure:
         axes.margins(x=0.0)
     current.spines["top"].set_visible(False)
     speed.legend(loc="upper right", frameon=False, ncols=3)
-    position.legend(loc="upper right", frameon=False, ncols=2)
+    position.legend(loc="upper left", frameon=False, ncols=2)
     _mark_commands(speed, (position, motor), commands_of(trace))
     return figure
 
@@ -99,7 +99,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="the picture: .png, .svg or .pdf")
     options = parser.parse_args(arguments)
     try:
-        _save(draw_trace(read_trace(options.trace), options.trace.name), options.out)
+        save_figure(draw_trace(read_trace(options.trace), options.trace.name), options.out)
     except (OSError, ValueError) as error:
         print(f"plot_trace: {error}", file=sys.stderr)
         return 2
@@ -130,7 +130,7 @@ def _mark_commands(labelled: Axes, others: tuple[Axes, ...], commands: list[tupl
         )
 
 
-def _save(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
     """Write the picture under a temporary name first, so that no half of it is ever at `path`."""
     partial = path.with_name(f"{path.stem}.part{path.suffix}")
     try:
