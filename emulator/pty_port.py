@@ -4,10 +4,12 @@ The device is raw and at the table's own rate before its name is known, the serv
 here blocks, and the clients that come and go are watched.
 """
 
+import fcntl
 import os
 import termios
 import tty
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -17,8 +19,8 @@ from emulator.outbox import Outbox
 from emulator.port import Arrival
 from emulator.terminal_baud import get_baud, set_baud
 
-READ_BYTES = 4096
-"""Most that one read takes: a pty holds no more for one side."""
+READ_BYTES = 256
+"""What one look takes of a client that stays."""
 
 _DEFAULT_BAUD = 9600
 
@@ -68,11 +70,14 @@ class PtyPort:
     def receive(self) -> Arrival:
         """Return what clients have done since the last call."""
         left, wrote_since = self._follow_clients()
-        data = self._read()
-        if left and self._clients == 0:
-            self._restore_device()
-        # A client that came after the other left wrote this, or else it is what the other left behind.
-        return Arrival(left_before=left and wrote_since, data=data, left_after=left and not wrote_since)
+        if left and not wrote_since:
+            # All that is there is of the one that left: taken whole, the next one's bytes come apart from it.
+            arrival = Arrival(data=self._read(whole=True), left_after=True)
+        else:
+            arrival = Arrival(left_before=left, data=self._read())
+        if left:
+            self._let_go()
+        return arrival
 
     def send(self, data: bytes) -> None:
         """Give replies to the client; they are lost when nobody has the port open, or nobody reads it."""
@@ -95,13 +100,15 @@ class PtyPort:
         os.close(self._device)
         os.close(self._server)
 
-    def _read(self) -> bytes:
+    def _read(self, whole: bool = False) -> bytes:
+        """Return bytes as the table hears them: all that are there, or no more than `READ_BYTES`."""
         self._notice_rate()
-        try:
-            data = os.read(self._server, READ_BYTES)
-        except BlockingIOError:
-            return b""
-        return self._as_heard(data, self._client_baud, self._baud)
+        data = bytearray()
+        with suppress(BlockingIOError):
+            data += os.read(self._server, READ_BYTES)
+            while whole:
+                data += os.read(self._server, READ_BYTES)
+        return self._as_heard(bytes(data), self._client_baud, self._baud)
 
     def _follow_clients(self) -> tuple[bool, bool]:
         """Return whether the last client left since the last call, and whether another wrote after that."""
@@ -119,12 +126,17 @@ class PtyPort:
                 wrote_since = left
         return left, wrote_since
 
-    def _restore_device(self) -> None:
-        """Leave the device to the next client as the first one found it, with no reply to the last one in it."""
+    def _let_go(self) -> None:
+        """Forget a client that has left, and leave the device to the next one as the first one found it."""
         if self._outbox.dropped_bytes:
             self._warn(f"{self._outbox.dropped_bytes} bytes of replies were dropped, since nobody read them")
         self._outbox.clear()
+        self._client_baud = self._baud
+        if self._clients:
+            return
         termios.tcflush(self._device, termios.TCIFLUSH)
+        # A terminal program may have locked the device, which otherwise ends only with the server.
+        fcntl.ioctl(self._device, termios.TIOCNXCL)
         if termios.tcgetattr(self._device) != self._settings:
             termios.tcsetattr(self._device, termios.TCSANOW, self._settings)
             set_baud(self._device, self._baud or _DEFAULT_BAUD)

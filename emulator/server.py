@@ -24,8 +24,8 @@ _CATCH_UP_S = 0.05
 """Longest stretch of catching up before clients are heard again."""
 _GIVE_UP_S = 0.5
 """How far simulated time may be behind the clock before the clock is held back."""
-_LINE_BUFFER_BYTES = 4096
-"""What waits for a slow line, as in the driver of a real one; a client that sends more is made to wait."""
+_LINE_BUFFER_BYTES = 256
+"""What waits for a slow line, in the driver of a real one; a client that sends more is made to wait."""
 _LAST_FRACTION = 1.0 - 2.0**-20
 """The latest that an edge can be in a tick."""
 _TRIGGER_SIGNAL = "SIGUSR1"

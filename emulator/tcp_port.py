@@ -8,7 +8,8 @@ from emulator.outbox import Outbox
 from emulator.port import Arrival
 
 LOOPBACK = "127.0.0.1"
-READ_BYTES = 4096
+READ_BYTES = 256
+"""What one look takes."""
 
 
 def parse_address(text: str) -> tuple[str, int]:

@@ -216,6 +216,17 @@ def test_an_unread_client_blocks_neither_commands_nor_others(stand_in: Start, wa
     os.close(deaf)
 
 
+def test_a_client_that_floods_a_slow_line_is_made_to_wait_and_the_next_one_is_not_confused(stand_in: Start) -> None:
+    table = stand_in("--pty", "--time-scale", "20")
+    with open_port(table.port) as port:
+        port.write_timeout = 0.2
+        with pytest.raises(serial.SerialTimeoutException):
+            port.write(b"L\r" * 100_000)
+    time.sleep(0.1)
+    with open_port(table.port) as port:
+        assert ask(port, b"H") == b"H 0.0\r"
+
+
 def test_a_wrong_rate_is_garbage_and_stderr_says_why(stand_in: Start) -> None:
     table = stand_in("--pty")
     with open_port(table.port, 4800) as port:

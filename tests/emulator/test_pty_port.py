@@ -1,3 +1,4 @@
+import fcntl
 import os
 import select
 import sys
@@ -9,12 +10,15 @@ import serial
 
 from emulator.outbox import LIMIT_BYTES
 from emulator.port import Arrival
-from emulator.pty_port import PtyPort
+from emulator.pty_port import READ_BYTES, PtyPort
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what is known about ptys was measured on Linux")
 
 PTY_BYTES = 40_000
 """More than a pty holds one way."""
+
+TIOCGEXCL = 0x80045440
+"""Linux's question whether a terminal is locked; Python has no name for it."""
 
 Open = Callable[[str], int]
 
@@ -173,6 +177,24 @@ def test_the_next_client_finds_the_device_as_the_first_one_did(port: PtyPort, op
     os.close(client)
     port.receive()
     assert termios.tcgetattr(opened(port.name)) == before
+
+
+def test_a_lock_that_a_client_left_behind_is_undone(port: PtyPort, opened: Open) -> None:
+    client = opened(port.name)
+    fcntl.ioctl(client, termios.TIOCEXCL)
+    os.close(client)
+    port.receive()
+    is_locked = fcntl.ioctl(opened(port.name), TIOCGEXCL, bytes(4))
+    assert is_locked == bytes(4)
+
+
+def test_all_that_a_client_wrote_before_it_left_arrives_with_its_leaving(port: PtyPort, opened: Open) -> None:
+    client = opened(port.name)
+    os.write(client, b"H\r" * 1500)
+    assert port.receive() == Arrival(data=b"H\r" * (READ_BYTES // 2))
+    os.close(client)
+    assert port.receive() == Arrival(data=b"H\r" * (1500 - READ_BYTES // 2), left_after=True)
+    assert port.receive() == Arrival()
 
 
 def test_two_programs_at_once_are_warned_of(port: PtyPort, opened: Open, warnings: list[str]) -> None:
