@@ -1,0 +1,167 @@
+"""The signed distance of a mesh on a regular grid: positive outside, negative inside, in mm.
+
+It is built once with trimesh and kept on disk under the mesh's content and the resolution; kernels look it up.
+"""
+
+import hashlib
+import os
+import zipfile
+from collections.abc import Callable
+from math import floor, sqrt
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from planner.kernel import cache_directory, kernel
+
+_BLOCK_POINTS = 4096
+"""Points handed to trimesh at once: a step of progress, and a bound on the memory."""
+_MOST_POINTS = 4_000_000
+_STEP = 0.25
+"""Shortest stride of the walk along a segment, in grid spacings."""
+
+
+class SignedDistanceField(NamedTuple):
+    """A grid of signed distances.
+
+    Attributes:
+        values_mm: `(nx, ny, nz)` float32, the signed distance at the grid's points.
+        origin_mm: `(3,)`, the grid's first point in the mesh's frame.
+        spacing_mm: The distance between neighbouring points.
+    """
+
+    values_mm: NDArray[np.float32]
+    origin_mm: NDArray[np.float64]
+    spacing_mm: float
+
+
+NO_FIELD = SignedDistanceField(np.zeros((2, 2, 2), np.float32), np.zeros(3), 1.0)
+"""What a kernel is handed where no part is a mesh."""
+
+
+def build_field(
+    mesh: trimesh.Trimesh, spacing_mm: float, progress: Callable[[int, int], None] | None = None
+) -> SignedDistanceField:
+    """Return the signed distance field of a watertight mesh; the grid reaches a cell beyond it on each side.
+
+    Args:
+        mesh: The mesh, in mm.
+        spacing_mm: The grid's spacing.
+        progress: Called with the points done and all points, between blocks.
+
+    Raises:
+        ValueError: The spacing is not positive, or so small that the grid would not fit in memory.
+    """
+    if not spacing_mm > 0.0:
+        raise ValueError(f"the spacing of a distance field is {spacing_mm:g} mm, it must be above 0")
+    lower, upper = np.asarray(mesh.bounds, dtype=np.float64)
+    shape = np.ceil((upper - lower) / spacing_mm).astype(int) + 3
+    if np.prod(shape.astype(float)) > _MOST_POINTS:
+        raise ValueError(
+            f"a distance field of {shape[0]} x {shape[1]} x {shape[2]} points is too large, choose a spacing above "
+            f"{spacing_mm:g} mm"
+        )
+    origin = (lower + upper) / 2 - (shape - 1) * spacing_mm / 2
+    values = np.empty(int(np.prod(shape)), dtype=np.float32)
+    for start in range(0, len(values), _BLOCK_POINTS):
+        index = np.arange(start, min(start + _BLOCK_POINTS, len(values)))
+        points = origin + spacing_mm * np.stack(np.unravel_index(index, tuple(shape)), axis=1)
+        values[index] = -trimesh.proximity.signed_distance(mesh, points)  # trimesh counts inside as positive
+        if progress is not None:
+            progress(int(index[-1]) + 1, len(values))
+    return SignedDistanceField(values.reshape(tuple(shape)), origin, spacing_mm)
+
+
+def cached_field(
+    mesh: trimesh.Trimesh,
+    spacing_mm: float,
+    progress: Callable[[int, int], None] | None = None,
+    folder: Path | None = None,
+) -> SignedDistanceField:
+    """Return the field of `mesh`, read from `folder` if it was built before (default: the user's cache)."""
+    file = (folder or _cache_folder()) / f"{_digest(mesh, spacing_mm)}.npz"
+    stored = _load(file)
+    if stored is not None:
+        return stored
+    field = build_field(mesh, spacing_mm, progress)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    partial = file.with_name(f"{file.stem}.{os.getpid()}.partial.npz")
+    np.savez(partial, **field._asdict())
+    partial.replace(file)
+    return field
+
+
+def _cache_folder() -> Path:
+    return cache_directory().parent / "distance-fields"
+
+
+def _digest(mesh: trimesh.Trimesh, spacing_mm: float) -> str:
+    content = hashlib.sha256(np.float64(spacing_mm).tobytes())
+    content.update(np.ascontiguousarray(mesh.vertices, dtype=np.float64).tobytes())
+    content.update(np.ascontiguousarray(mesh.faces, dtype=np.int64).tobytes())
+    return content.hexdigest()[:32]
+
+
+def _load(file: Path) -> SignedDistanceField | None:
+    """Return the stored field, or None where there is none or a damaged one: it is then built anew."""
+    try:
+        with file.open("rb") as content, np.load(content) as stored:
+            return SignedDistanceField(stored["values_mm"], stored["origin_mm"], float(stored["spacing_mm"]))
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+@kernel
+def look_up(
+    values: NDArray[np.float32], origin: NDArray[np.float64], spacing: float, x: float, y: float, z: float
+) -> float:
+    """Return the signed distance in mm at a point of the mesh's frame.
+
+    On the grid it is trilinear, so at most half a cell's diagonal off. Beyond it, it is a lower bound: the mesh lies
+    within the grid, so the way there is the longer side of a triangle that is blunt where it enters the grid.
+    """
+    nx, ny, nz = values.shape
+    gx, gy, gz = (x - origin[0]) / spacing, (y - origin[1]) / spacing, (z - origin[2]) / spacing
+    cx, cy, cz = min(max(gx, 0.0), nx - 1.0), min(max(gy, 0.0), ny - 1.0), min(max(gz, 0.0), nz - 1.0)
+    i, j, k = min(int(floor(cx)), nx - 2), min(int(floor(cy)), ny - 2), min(int(floor(cz)), nz - 2)
+    u, v, w = cx - i, cy - j, cz - k
+    near = (1 - u) * (1 - v) * values[i, j, k] + u * (1 - v) * values[i + 1, j, k]
+    near += (1 - u) * v * values[i, j + 1, k] + u * v * values[i + 1, j + 1, k]
+    far = (1 - u) * (1 - v) * values[i, j, k + 1] + u * (1 - v) * values[i + 1, j, k + 1]
+    far += (1 - u) * v * values[i, j + 1, k + 1] + u * v * values[i + 1, j + 1, k + 1]
+    inside = (1 - w) * near + w * far
+    dx, dy, dz = (gx - cx) * spacing, (gy - cy) * spacing, (gz - cz) * spacing
+    outside = dx * dx + dy * dy + dz * dz
+    if outside == 0.0:
+        return inside
+    return sqrt(outside + max(inside, 0.0) ** 2)
+
+
+@kernel
+def field_distance(
+    values: NDArray[np.float32], origin: NDArray[np.float64], spacing: float,
+    ax: float, ay: float, az: float, bx: float, by: float, bz: float, enough_mm: float,
+) -> float:  # fmt: skip
+    """Return a lower bound in mm of the least signed distance of the segment a-b from the mesh.
+
+    It is never above the true distance and, where the segment runs within the grid, at most two spacings below.
+    Where the distance is `enough_mm` or more, the result is only known to be at least that. The walk along the segment strides as far as the distance
+    at hand allows: nothing nearer than the least one found can lie within the difference of the two.
+    """
+    ux, uy, uz = bx - ax, by - ay, bz - az
+    length = sqrt(ux * ux + uy * uy + uz * uz)
+    shortest = _STEP * spacing
+    # Half a cell's diagonal from the look-up, half a shortest stride from the walk.
+    error = (0.5 * sqrt(3.0) + 0.5 * _STEP) * spacing
+    least = enough_mm + error
+    along = 0.0
+    while True:
+        t = along / length if length > 0.0 else 0.0
+        value = look_up(values, origin, spacing, ax + t * ux, ay + t * uy, az + t * uz)
+        least = min(least, value)
+        if along >= length:
+            return least - error
+        along = min(along + max(value - least, shortest), length)
