@@ -14,12 +14,14 @@ import trimesh
 
 from planner.arm import Arm
 from planner.arrays import FloatArray
+from planner.bodies import Bodies, load_bodies
 from planner.cell import Cell, Probe, Table, placement
 from planner.errors import PlannerError, ScanFileError, WorkpieceError
 from planner.mesh import load_mesh, radius_about_axis_mm
 from planner.patterns import PATTERNS, Coverage
 from planner.scan_path import ScanPath, at_scan_speed, load_scan_path
 from planner.toml_table import TomlTable
+from planner.value import ValueFunction
 from planner.workpiece import CLASSES, Workpiece
 
 _SHIPPED = Path(__file__).parent / "scans"
@@ -36,24 +38,16 @@ class TableLimits:
 
 
 @dataclass(frozen=True)
-class Weights:
-    """Weights of the value function and of the cost of a path.
+class CostWeights:
+    """Weights of the table's motion in Eq. (5).
 
     Attributes:
-        k_a: Weight of the squared table acceleration in Eq. (5), (deg/s2)^-2.
-        k_w: Weight of the squared table speed in Eq. (5), (deg/s)^-2.
-        gamma: Exponents of Eq. (1), one per joint; a greater one keeps the joint nearer the middle of its range.
-        wrist_singularity_deg: Angle between the axes of joints 4 and 6 below which a pose is forbidden.
-        minimum_clearance_mm: Clearance below which a pose is forbidden.
-        comfort_clearance_mm: Clearance from which on nearness no longer lowers the value.
+        k_a: Weight of the squared acceleration, (deg/s2)^-2.
+        k_w: Weight of the squared speed, (deg/s)^-2.
     """
 
     k_a: float
     k_w: float
-    gamma: tuple[float, ...] = (0.2,) * 6
-    wrist_singularity_deg: float = 8.0
-    minimum_clearance_mm: float = 5.0
-    comfort_clearance_mm: float = 40.0
 
 
 @dataclass(frozen=True)
@@ -63,20 +57,26 @@ class Scan:
     Attributes:
         name: The scan file's name without its ending.
         cell: Arm, table and probe.
+        bodies: What moves with the arm and must not collide.
+        workpiece: The workpiece's class and dimensions; None for a mesh of no class.
         mesh: The workpiece's closed surface in frame W, mm.
+        mesh_file: Where that surface was read; None where it follows from the dimensions.
         path: Where the probe must be.
+        value: What makes a pose good.
         limits: The table's limits.
-        weights: Weights of value and cost.
-        workpiece: The workpiece's class and dimensions; None for a mesh whose path comes from a file.
+        weights: Weights of the table's motion.
     """
 
     name: str
     cell: Cell
+    bodies: Bodies = field(repr=False)
+    workpiece: Workpiece | None
     mesh: trimesh.Trimesh = field(repr=False)
+    mesh_file: Path | None
     path: ScanPath = field(repr=False)
+    value: ValueFunction
     limits: TableLimits
-    weights: Weights
-    workpiece: Workpiece | None = None
+    weights: CostWeights
 
 
 def shipped_scans() -> list[str]:
@@ -96,14 +96,15 @@ def load_scan(scan: str | Path) -> Scan:
         raise ScanFileError(f"{scan} is neither a scan file nor one of the shipped scans {', '.join(shipped_scans())}")
     top = TomlTable.load(file)
     with _named(file):
-        cell = _read_cell(top.table("cell"), file.parent)
-        workpiece, mesh = _read_workpiece(top.table("workpiece"), file.parent)
+        cell, bodies = _read_cell(top.table("cell"), file.parent)
+        workpiece, mesh, mesh_file = _read_workpiece(top.table("workpiece"), file.parent)
         _check_it_fits_the_table(mesh, cell)
         path = _read_path(top.table("path"), file.parent, cell.probe, workpiece)
+        value = ValueFunction.read(top.table("value"))
         limits = _read_limits(top.table("limits"))
         weights = _read_weights(top.table("weights"), limits)
     top.finish()
-    return Scan(file.stem, cell, mesh, path, limits, weights, workpiece)
+    return Scan(file.stem, cell, bodies, workpiece, mesh, mesh_file, path, value, limits, weights)
 
 
 @contextmanager
@@ -117,9 +118,9 @@ def _named(file: Path) -> Iterator[None]:
         raise type(error)(f"{file}: {error}") from error
 
 
-def _read_cell(section: TomlTable, folder: Path) -> Cell:
-    arm = section.text("arm", "viper_s650")
-    beside = folder / arm
+def _read_cell(section: TomlTable, folder: Path) -> tuple[Cell, Bodies]:
+    arm = Arm.load(_beside(folder, section.text("arm", "viper_s650")))
+    bodies_file = _beside(folder, section.text("bodies", "viper_s650"))
     placed = {
         name: _placement(section, key)
         for name, key in (("T_BT", "table_in_base"), ("T_TW", "workpiece_on_table"), ("T_FS", "probe_on_flange"))
@@ -127,7 +128,13 @@ def _read_cell(section: TomlTable, folder: Path) -> Cell:
     }
     table, probe = _read_table(section.table("table")), _read_probe(section.table("probe"))
     section.finish()
-    return Cell(arm=Arm.load(beside if beside.is_file() else arm), table=table, probe=probe, **placed)
+    cell = Cell(arm=arm, table=table, probe=probe, **placed)
+    return cell, load_bodies(probe, cell.T_FS, bodies_file)
+
+
+def _beside(folder: Path, name: str) -> Path | str:
+    """Return the file of that name in the scan file's folder, else the name: that of a shipped one."""
+    return folder / name if (folder / name).is_file() else name
 
 
 def _placement(section: TomlTable, key: str) -> FloatArray:
@@ -159,17 +166,18 @@ def _read_probe(section: TomlTable) -> Probe:
     return probe
 
 
-def _read_workpiece(section: TomlTable, folder: Path) -> tuple[Workpiece | None, trimesh.Trimesh]:
+def _read_workpiece(section: TomlTable, folder: Path) -> tuple[Workpiece | None, trimesh.Trimesh, Path | None]:
     if "mesh" in section:
-        mesh = load_mesh(folder / section.text("mesh"))
+        mesh_file = folder / section.text("mesh")
         kind = section.choice("class", (*CLASSES, "other"), "other")
         section.finish()
-        return (CLASSES[kind].measured(mesh) if kind != "other" else None), mesh
+        mesh = load_mesh(mesh_file)
+        return (CLASSES[kind].measured(mesh) if kind != "other" else None), mesh, mesh_file
     shape = CLASSES[section.choice("class", tuple(CLASSES))]
     names = [item.name for item in fields(shape) if item.name != "middle_mm"]
     workpiece = shape(middle_mm=(0.0, 0.0, 0.0), **{name: section.number(name, above=0.0) for name in names})
     section.finish()
-    return workpiece, workpiece.mesh()
+    return workpiece, workpiece.mesh(), None
 
 
 def _check_it_fits_the_table(mesh: trimesh.Trimesh, cell: Cell) -> None:
@@ -223,20 +231,10 @@ def _read_limits(section: TomlTable) -> TableLimits:
     return limits
 
 
-def _read_weights(section: TomlTable, limits: TableLimits) -> Weights:
-    gamma = section.numbers("gamma", 6, Weights.gamma)
-    if min(gamma) < 0.0:
-        raise section.refuse("gamma", "a list of 6 numbers at least 0")
-    minimum_mm = section.number("minimum_clearance_mm", Weights.minimum_clearance_mm, at_least=0.0)
-    weights = Weights(
+def _read_weights(section: TomlTable, limits: TableLimits) -> CostWeights:
+    weights = CostWeights(
         k_a=section.number("k_a", 0.1 / limits.acceleration_deg_s2**2, at_least=0.0),
         k_w=section.number("k_w", 0.1 / limits.speed_deg_s**2, at_least=0.0),
-        gamma=gamma,
-        wrist_singularity_deg=section.number(
-            "wrist_singularity_deg", Weights.wrist_singularity_deg, at_least=0.0, at_most=90.0
-        ),
-        minimum_clearance_mm=minimum_mm,
-        comfort_clearance_mm=section.number("comfort_clearance_mm", Weights.comfort_clearance_mm, above=minimum_mm),
     )
     section.finish()
     return weights
