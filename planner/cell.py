@@ -65,7 +65,7 @@ class Cell:
     """
 
     arm: Arm = field(default_factory=Arm.load)
-    T_BT: FloatArray = field(default_factory=lambda: placement(540.0, 0.0, 120.0, 0.0, 0.0, 0.0))
+    T_BT: FloatArray = field(default_factory=lambda: placement(570.0, 0.0, 120.0, 0.0, 0.0, 0.0))
     T_TW: FloatArray = field(default_factory=lambda: np.eye(4))
     T_FS: FloatArray = field(default_factory=lambda: placement(0.0, 0.0, 100.0, 0.0, 0.0, 0.0))
     table: Table = field(default_factory=Table)

@@ -36,6 +36,7 @@ class Coverage:
         top_polar_deg: Where a sphere's strips begin, as an angle from its pole.
         lowest_polar_deg: Where a sphere's strips end: below its equator the table is in the way.
         bottom_margin_mm: Least height of the line's middle over the base of a cylinder.
+        wall_margin_mm: How far from a mould's walls its strips end, so that the beam passes the wall.
         tilt_deg: How far `tilted` leans the beam to see the walls.
     """
 
@@ -43,6 +44,7 @@ class Coverage:
     top_polar_deg: float = 10.0
     lowest_polar_deg: float = 90.0
     bottom_margin_mm: float = 40.0
+    wall_margin_mm: float = 15.0
     tilt_deg: float = 25.0
 
     def pitch_mm(self, line_width_mm: float) -> float:
@@ -159,7 +161,8 @@ MouldCorner = tuple[float, float, float, float]
 
 
 def _strips(mould: Mould, probe: Probe, coverage: Coverage) -> list[MouldCorner]:
-    ends = (-0.5 * mould.cavity_length_mm, 0.5 * mould.cavity_length_mm)
+    end = max(0.0, 0.5 * mould.cavity_length_mm - coverage.wall_margin_mm)
+    ends = (-end, end)
     middles = coverage.strip_centres(mould.cavity_width_mm, probe.line_width_mm)
     return [
         (x, float(y), 0.0, 0.0) for strip, y in enumerate(middles) for x in (ends if strip % 2 == 0 else ends[::-1])

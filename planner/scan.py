@@ -218,6 +218,7 @@ def _read_coverage(section: TomlTable) -> Coverage:
             "lowest_polar_deg", Coverage.lowest_polar_deg, above=top_polar_deg, at_most=180.0
         ),
         bottom_margin_mm=section.number("bottom_margin_mm", Coverage.bottom_margin_mm, at_least=0.0),
+        wall_margin_mm=section.number("wall_margin_mm", Coverage.wall_margin_mm, at_least=0.0),
         tilt_deg=section.number("tilt_deg", Coverage.tilt_deg, at_least=0.0, at_most=60.0),
     )
 

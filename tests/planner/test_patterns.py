@@ -82,8 +82,8 @@ def test_the_line_passes_over_the_whole_cylinder_above_its_bottom_margin(pattern
 
 
 @pytest.mark.parametrize("pattern", ["raster", "crossed", "tilted"])
-def test_the_line_passes_over_the_whole_floor_of_the_mould(pattern: str) -> None:
-    x, y = np.meshgrid(np.linspace(-119.0, 119.0, 40), np.linspace(-69.0, 69.0, 24))
+def test_the_line_passes_over_the_floor_of_the_mould_up_to_the_wall_margin(pattern: str) -> None:
+    x, y = np.meshgrid(np.linspace(-105.0, 105.0, 40), np.linspace(-69.0, 69.0, 24))
     wanted = np.column_stack((x.ravel() + 5.0, y.ravel() - 10.0, np.full(x.size, 50.0)))
     covered = covered_points(waypoints_of("mould", pattern))
     # A tilted line leaves the floor's plane towards its ends: follow it along the beam down to the floor.
