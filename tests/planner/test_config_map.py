@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
 
-from planner.config_map import ConfigurationMap
+from planner.config_map import ConfigurationMap, ConfigurationMapError
 
 ANGLES = st.floats(-2000.0, 2000.0)
 
@@ -88,28 +88,28 @@ def test_a_map_is_a_frozen_copy() -> None:
 def test_a_value_that_is_none_is_refused_with_its_place(wrong: float) -> None:
     values = np.ones((3, 4))
     values[2, 1] = wrong
-    with pytest.raises(ValueError, match="location 2, angle index 1"):
+    with pytest.raises(ConfigurationMapError, match="location 2, angle index 1"):
         ConfigurationMap(values)
 
 
 @pytest.mark.parametrize("shape", [(0, 4), (4, 1), (4,), (2, 2, 2)])
 def test_a_shape_that_is_no_map_is_refused(shape: tuple[int, ...]) -> None:
-    with pytest.raises(ValueError, match="shape"):
+    with pytest.raises(ConfigurationMapError, match="shape"):
         ConfigurationMap(np.ones(shape))
 
 
 def test_reasons_of_another_shape_are_refused() -> None:
-    with pytest.raises(ValueError, match="reasons"):
+    with pytest.raises(ConfigurationMapError, match="reasons"):
         ConfigurationMap(np.ones((2, 4)), reasons=np.zeros((4, 2), dtype=np.uint8))
 
 
 @pytest.mark.parametrize("epsilon", [-0.1, 1.0, math.nan])
 def test_an_epsilon_that_forbids_all_or_nothing_is_refused(epsilon: float) -> None:
-    with pytest.raises(ValueError, match="epsilon"):
+    with pytest.raises(ConfigurationMapError, match="epsilon"):
         ConfigurationMap(np.ones((2, 4)), epsilon=epsilon)
 
 
 @pytest.mark.parametrize("location", [-0.1, 5.1, math.nan])
 def test_a_point_off_the_map_is_refused(location: float) -> None:
-    with pytest.raises(ValueError, match="off the map"):
+    with pytest.raises(ConfigurationMapError, match="off the map"):
         random_map(1).value(location, 0.0)

@@ -1,0 +1,308 @@
+"""The least cost from every state (column, speed, angle) to the last column, by backward dynamic programming.
+
+Speeds lie on a grid and each step joins two of its speeds. The acceleration, and by how much the angle moves in the
+step, then depend on these two speeds alone; and only the angle, one-dimensional and periodic, is interpolated. A value
+is interpolated from two finite ones or it is infinite, so no cost leaks across the border of what can be crossed.
+
+The innermost loop runs along the angle axis: contiguous, without branches or index arithmetic, in single precision.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from planner.arrays import FloatArray
+from planner.config_map import SAMPLE_TOLERANCE, column_value, sample_at_or_above, sample_at_or_below
+from planner.cost import acceleration_cost, speed_cost, value_cost
+from planner.crossing import crossing_is_allowed
+from planner.kernel import kernel
+from planner.motion import swept_angles
+from planner.problem import Problem, Terms
+
+CostArray = npt.NDArray[np.float32]
+IndexArray = npt.NDArray[np.int64]
+
+# Infinity that survives a weight of 0, in single precision; what comes out of an interpolation with it is far above
+# ANY_COST, which in turn is far above what a path can cost in units of the greatest step cost.
+UNREACHABLE = np.float32(1e30)
+ANY_COST = np.float32(1e12)
+ONE = np.float32(1.0)
+
+# A multiple of the vector length keeps the inner loop free of a scalar tail.
+LANES = 8
+JUMPS_AT_A_TIME = 3
+
+
+# So many changes of speed each way, at least, within the acceleration limit.
+LEAST_REACH = 4
+
+
+class Grid(NamedTuple):
+    """Where the cost-to-go is sampled.
+
+    Attributes:
+        angle_count: angles over one turn.
+        angle_origin_deg: the first of them.
+        speed_step_deg_s: distance of neighbouring speeds.
+        half_count: speeds run from -half_count to half_count steps.
+        jumps: (n_jumps,) the changes of speed that a step may make, in speed steps, ascending.
+    """
+
+    angle_count: int
+    angle_origin_deg: float
+    speed_step_deg_s: float
+    half_count: int
+    jumps: IndexArray
+
+    @property
+    def speeds_deg_s(self) -> FloatArray:
+        """The (2 half_count + 1,) speeds of the grid, ascending."""
+        return np.arange(-self.half_count, self.half_count + 1) * self.speed_step_deg_s
+
+
+class CostToGo(NamedTuple):
+    """The cost-to-go and its grid.
+
+    Attributes:
+        grid: where it is sampled.
+        costs: (n + 1, n_speeds, n_angles), in units of `unit`; above ANY_COST where the path cannot be crossed.
+        unit: cost of one unit. It keeps any weights within single precision.
+    """
+
+    grid: Grid
+    costs: CostArray
+    unit: float
+
+
+class _Transitions(NamedTuple):
+    """What a step between two speeds does to the angle, per (speed, jump), in samples of the grid's angle axis."""
+
+    target: IndexArray  # speed index at the end of the step; n_speeds, where all is unreachable: off the grid
+    shift: IndexArray  # whole samples that the angle moves, wrapped to one turn
+    fraction: CostArray  # and the rest, 0 .. 1
+    sweep_start: IndexArray  # sample at or below the lowest angle met on the way, wrapped
+    sweep_length: IndexArray  # cells swept from there, at most one turn
+    cost: CostArray  # first term of Eq. (5)
+
+
+def ladder(reach: int, count: int) -> IndexArray:
+    """Return up to `count` changes of speed within `reach` grid steps: odd, symmetric, with 0, denser near 0."""
+    half = (count - 1) // 2
+    rungs = {max(i, round(reach * (i / half) ** 2)) for i in range(half + 1)} if half else {0}
+    positive = sorted(rung for rung in rungs if rung <= reach)
+    return np.array(sorted({sign * rung for rung in positive for sign in (-1, 1)}), dtype=np.int64)
+
+
+def default_grid(problem: Problem, refinement: int = 2, speed_count: int = 61, jump_count: int = 15) -> Grid:
+    """Return a grid that has the full acceleration among its jumps.
+
+    Where the table is slow to gain speed the grid has more speeds, so that at least `LEAST_REACH` jumps each way exist;
+    and where it cannot reach its greatest speed within the map, the grid ends at what it can reach.
+
+    Args:
+        problem: what is to be crossed.
+        refinement: angles of the grid per sample of the map.
+        speed_count: speeds, about.
+        jump_count: changes of speed per step, at most.
+    """
+    angle_count = problem.map.angle_count * refinement
+    half = (speed_count - 1) // 2
+    gain_deg_s = problem.limits.acceleration_deg_s2 * problem.step_s
+    top_deg_s = _attainable_speed(problem)
+    if gain_deg_s >= 2.0 * top_deg_s:
+        return Grid(angle_count, 0.0, top_deg_s / half, half, ladder(2 * half, jump_count))
+    reach = max(LEAST_REACH, round(gain_deg_s * half / top_deg_s))
+    step_deg_s = gain_deg_s / reach
+    half_count = max(1, math.floor(top_deg_s / step_deg_s + SAMPLE_TOLERANCE))
+    return Grid(angle_count, 0.0, step_deg_s, half_count, ladder(reach, jump_count))
+
+
+def exact_grid(problem: Problem, refinement: int, jump_count: int = 21) -> Grid:
+    """Return a grid on which every step ends exactly on a node, so that nothing is interpolated.
+
+    A step from speed i to speed j moves the angle by (i + j) / 2 speed steps x time; with the speed step at two angle
+    steps per time step, that is i + j angle steps.
+
+    Args:
+        problem: what is to be crossed; the angles of the grid count from its start angle.
+        refinement: angles of the grid per sample of the map.
+        jump_count: changes of speed per step, at most.
+    """
+    angle_count = problem.map.angle_count * refinement
+    step_deg_s = 2.0 * 360.0 / angle_count / problem.step_s
+    half_count = math.floor(_attainable_speed(problem) / step_deg_s + SAMPLE_TOLERANCE)
+    reach = math.floor(problem.limits.acceleration_deg_s2 * problem.step_s / step_deg_s + SAMPLE_TOLERANCE)
+    jumps = ladder(min(reach, 2 * half_count), jump_count)
+    return Grid(angle_count, problem.start_angle_deg or 0.0, step_deg_s, half_count, jumps)
+
+
+def _attainable_speed(problem: Problem) -> float:
+    """Return the greatest speed that can occur along the path."""
+    if problem.start_speed_deg_s is None:
+        return problem.limits.speed_deg_s
+    gain_deg_s = problem.limits.acceleration_deg_s2 * problem.step_s
+    return min(problem.limits.speed_deg_s, abs(problem.start_speed_deg_s) + problem.step_count * gain_deg_s)
+
+
+def cost_to_go(problem: Problem, grid: Grid) -> CostToGo:
+    """Return the least cost from every state of the grid to the last column.
+
+    Memory is dominated by the result: 4 bytes a state.
+    """
+    unit = problem.greatest_step_cost
+    transitions = _transitions(problem.terms, grid, unit)
+    columns = _columns(problem.terms, grid.angle_count, grid.angle_origin_deg)
+    arrival = (problem.terms.speed_weight * grid.speeds_deg_s**2 / unit).astype(np.float32)
+    costs = _solve(*columns, np.float32(1.0 / unit), transitions, arrival)
+    return CostToGo(grid, costs, unit)
+
+
+@kernel
+def cost_from(costs: CostArray, grid: Grid, column: int, speed: int, angle_deg: float) -> float:
+    """Return the cost-to-go at a speed of the grid and any angle, interpolated; infinite where there is no way on."""
+    count = costs.shape[2]
+    position = (angle_deg - grid.angle_origin_deg) * count / 360.0
+    below, above = sample_at_or_below(position), sample_at_or_above(position)
+    lower, upper = float(costs[column, speed, below % count]), float(costs[column, speed, above % count])
+    if lower > ANY_COST or upper > ANY_COST:
+        return np.inf
+    return lower + (position - below) * (upper - lower) if above > below else lower
+
+
+@kernel
+def _transitions(
+    terms: Terms, grid: Grid, unit: float
+) -> _Transitions:
+    angle_count, _, speed_step_deg_s, half_count, jumps = grid
+    speeds = 2 * half_count + 1
+    shape = (speeds, (len(jumps) + JUMPS_AT_A_TIME - 1) // JUMPS_AT_A_TIME * JUMPS_AT_A_TIME)
+    target, shift, start, length = (
+        np.full(shape, speeds, dtype=np.int64),
+        np.zeros(shape, dtype=np.int64),
+        np.zeros(shape, dtype=np.int64),
+        np.zeros(shape, dtype=np.int64),
+    )
+    fraction, cost = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
+    samples_per_deg = angle_count / 360.0
+    for i in range(speeds):
+        for a in range(len(jumps)):
+            j = i + jumps[a]
+            if not 0 <= j < speeds:
+                continue
+            speed = (i - half_count) * speed_step_deg_s
+            acceleration = jumps[a] * speed_step_deg_s / terms.step_s
+            lowest, highest = swept_angles(0.0, speed, acceleration, terms.step_s)
+            moved = 0.5 * (i + j - 2 * half_count) * speed_step_deg_s * terms.step_s * samples_per_deg
+            whole = np.floor(moved + SAMPLE_TOLERANCE)
+            first = np.floor(lowest * samples_per_deg + SAMPLE_TOLERANCE)
+            last = np.ceil(highest * samples_per_deg - SAMPLE_TOLERANCE)
+            target[i, a] = j
+            shift[i, a] = int(whole) % angle_count
+            fraction[i, a] = moved - whole if moved - whole > SAMPLE_TOLERANCE else 0.0
+            start[i, a] = int(first) % angle_count
+            length[i, a] = min(int(last - first), angle_count)
+            cost[i, a] = acceleration_cost(terms.acceleration_weight, acceleration) / unit
+    return _Transitions(target, shift, fraction, start, length, cost)
+
+
+@kernel
+def _columns(terms: Terms, angle_count: int, origin_deg: float) -> tuple[FloatArray, IndexArray]:
+    """Return 1 - f_R at every node (infinite where forbidden), and how far one may sweep upwards from it in each step.
+
+    The second counts cells: 0 where only the node itself is allowed, -1 where not even that.
+    """
+    steps = len(terms.values) - 1
+    step_deg = 360.0 / angle_count
+    node_cost = np.empty((steps + 1, angle_count))
+    sweep = np.empty((steps, angle_count), dtype=np.int64)
+    for k in range(steps + 1):
+        for m in range(angle_count):
+            value = column_value(terms.values, terms.epsilon, k, origin_deg + m * step_deg)
+            node_cost[k, m] = value_cost(value) if value > terms.epsilon else np.inf
+    for k in range(steps):
+        run = 0
+        for m in range(2 * angle_count - 1, -1, -1):
+            angle = origin_deg + m * step_deg
+            run = run + 1 if crossing_is_allowed(terms.runs, k, angle, angle + step_deg) else 0
+            if m < angle_count:
+                is_open = run > 0 or crossing_is_allowed(terms.runs, k, angle, angle)
+                sweep[k, m] = min(run, angle_count) if is_open else -1
+    return node_cost, sweep
+
+
+@kernel
+def _solve(
+    node_cost: FloatArray, sweep: IndexArray, scale: float, transitions: _Transitions, arrival_cost: CostArray
+) -> CostArray:
+    steps, angles = sweep.shape
+    speeds = len(arrival_cost)
+    width = (angles + LANES - 1) // LANES * LANES
+    costs = np.empty((steps + 1, speeds, angles), dtype=np.float32)
+    costs[steps] = 0.0
+    arrivals = np.full((speeds + 1, width + angles + 1), UNREACHABLE)
+    barriers = np.empty((transitions.sweep_length.max() + 1, width + angles + 1), dtype=np.float32)
+    best = np.empty(width, dtype=np.float32)
+    for k in range(steps - 1, -1, -1):
+        _lay_out_arrivals(costs[k + 1], node_cost[k + 1], scale, arrival_cost, arrivals)
+        _lay_out_barriers(sweep[k], barriers)
+        for i in range(speeds):
+            _leave(i, arrivals, barriers, transitions, best)
+            for m in range(angles):
+                costs[k, i, m] = best[m] if best[m] < ANY_COST else UNREACHABLE
+    return costs
+
+
+@kernel
+def _lay_out_arrivals(
+    later: CostArray, node_cost: FloatArray, scale: float, arrival_cost: CostArray, arrivals: CostArray
+) -> None:
+    """Write, periodically continued, what it costs to arrive in the next column and to go on from there."""
+    angles = len(node_cost)
+    for j in range(len(arrival_cost)):
+        for m in range(angles):
+            total = np.float32(node_cost[m] * scale) + arrival_cost[j] + later[j, m]
+            arrivals[j, m] = min(total, UNREACHABLE)
+        for m in range(angles, arrivals.shape[1]):
+            arrivals[j, m] = arrivals[j, m - angles]
+
+
+@kernel
+def _lay_out_barriers(sweep: IndexArray, barriers: CostArray) -> None:
+    """Write, per length of the sweep and its first sample, 0 where it is allowed and infinity where it is not."""
+    for length in range(len(barriers)):
+        for m in range(len(sweep)):
+            barriers[length, m] = 0.0 if sweep[m] >= length else UNREACHABLE
+        for m in range(len(sweep), barriers.shape[1]):
+            barriers[length, m] = barriers[length, m - len(sweep)]
+
+
+@kernel
+def _leave(
+    speed: int, arrivals: CostArray, barriers: CostArray, transitions: _Transitions, best: CostArray
+) -> None:
+    """Write the least cost of leaving a speed, by any of its jumps, for each angle.
+
+    Three jumps at a time share what it costs to enter the innermost loop.
+    """
+    target, cost, fraction = transitions.target, transitions.cost, transitions.fraction
+    shift, start, length = transitions.shift, transitions.sweep_start, transitions.sweep_length
+    width = len(best)
+    best[:] = UNREACHABLE
+    for a in range(0, target.shape[1], JUMPS_AT_A_TIME):
+        b, c = a + 1, a + 2
+        row_a = arrivals[target[speed, a]][shift[speed, a] : shift[speed, a] + width + 1]
+        row_b = arrivals[target[speed, b]][shift[speed, b] : shift[speed, b] + width + 1]
+        row_c = arrivals[target[speed, c]][shift[speed, c] : shift[speed, c] + width + 1]
+        barrier_a = barriers[length[speed, a]][start[speed, a] : start[speed, a] + width]
+        barrier_b = barriers[length[speed, b]][start[speed, b] : start[speed, b] + width]
+        barrier_c = barriers[length[speed, c]][start[speed, c] : start[speed, c] + width]
+        cost_a, cost_b, cost_c = cost[speed, a], cost[speed, b], cost[speed, c]
+        upper_a, upper_b, upper_c = fraction[speed, a], fraction[speed, b], fraction[speed, c]
+        lower_a, lower_b, lower_c = ONE - upper_a, ONE - upper_b, ONE - upper_c
+        for m in range(width):
+            total_a = cost_a + barrier_a[m] + lower_a * row_a[m] + upper_a * row_a[m + 1]
+            total_b = cost_b + barrier_b[m] + lower_b * row_b[m] + upper_b * row_b[m + 1]
+            total_c = cost_c + barrier_c[m] + lower_c * row_c[m] + upper_c * row_c[m + 1]
+            best[m] = min(min(min(best[m], total_a), total_b), total_c)  # noqa: PLW3301 - this form is vectorised
