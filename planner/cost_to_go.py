@@ -16,7 +16,7 @@ import numpy.typing as npt
 from planner.arrays import FloatArray
 from planner.config_map import SAMPLE_TOLERANCE, column_value, sample_at_or_above, sample_at_or_below
 from planner.cost import acceleration_cost, speed_cost, value_cost
-from planner.crossing import crossing_is_allowed
+from planner.crossing import RunArray, crossing_is_allowed
 from planner.kernel import kernel
 from planner.motion import swept_angles
 from planner.problem import Problem, Terms
@@ -28,15 +28,12 @@ IndexArray = npt.NDArray[np.int64]
 # ANY_COST, which in turn is far above what a path can cost in units of the greatest step cost.
 UNREACHABLE = np.float32(1e30)
 ANY_COST = np.float32(1e12)
+NO_PAUSE = float(UNREACHABLE)
 ONE = np.float32(1.0)
 
 # A multiple of the vector length keeps the inner loop free of a scalar tail.
 LANES = 8
 JUMPS_AT_A_TIME = 3
-
-
-# So many changes of speed each way, at least, within the acceleration limit.
-LEAST_REACH = 4
 
 
 class Grid(NamedTuple):
@@ -76,7 +73,15 @@ class CostToGo(NamedTuple):
     unit: float
 
 
-class _Transitions(NamedTuple):
+class Workspace(NamedTuple):
+    """Room for one backward step: arrivals per speed and barriers per sweep, periodically continued; the best costs."""
+
+    arrivals: CostArray
+    barriers: CostArray
+    best: CostArray
+
+
+class Transitions(NamedTuple):
     """What a step between two speeds does to the angle, per (speed, jump), in samples of the grid's angle axis."""
 
     target: IndexArray  # speed index at the end of the step; n_speeds, where all is unreachable: off the grid
@@ -95,10 +100,12 @@ def ladder(reach: int, count: int) -> IndexArray:
     return np.array(sorted({sign * rung for rung in positive for sign in (-1, 1)}), dtype=np.int64)
 
 
-def default_grid(problem: Problem, refinement: int = 2, speed_count: int = 61, jump_count: int = 15) -> Grid:
+def default_grid(
+    problem: Problem, refinement: int = 2, speed_count: int = 61, jump_count: int = 15, least_reach: int = 4
+) -> Grid:
     """Return a grid that has the full acceleration among its jumps.
 
-    Where the table is slow to gain speed the grid has more speeds, so that at least `LEAST_REACH` jumps each way exist;
+    Where the table is slow to gain speed the grid has more speeds, so that at least `least_reach` jumps each way exist;
     and where it cannot reach its greatest speed within the map, the grid ends at what it can reach.
 
     Args:
@@ -106,6 +113,7 @@ def default_grid(problem: Problem, refinement: int = 2, speed_count: int = 61, j
         refinement: angles of the grid per sample of the map.
         speed_count: speeds, about.
         jump_count: changes of speed per step, at most.
+        least_reach: speed steps within the acceleration limit, at least.
     """
     angle_count = problem.map.angle_count * refinement
     half = (speed_count - 1) // 2
@@ -113,7 +121,7 @@ def default_grid(problem: Problem, refinement: int = 2, speed_count: int = 61, j
     top_deg_s = _attainable_speed(problem)
     if gain_deg_s >= 2.0 * top_deg_s:
         return Grid(angle_count, 0.0, top_deg_s / half, half, ladder(2 * half, jump_count))
-    reach = max(LEAST_REACH, round(gain_deg_s * half / top_deg_s))
+    reach = max(least_reach, round(gain_deg_s * half / top_deg_s))
     step_deg_s = gain_deg_s / reach
     half_count = max(1, math.floor(top_deg_s / step_deg_s + SAMPLE_TOLERANCE))
     return Grid(angle_count, 0.0, step_deg_s, half_count, ladder(reach, jump_count))
@@ -152,11 +160,16 @@ def cost_to_go(problem: Problem, grid: Grid) -> CostToGo:
     Memory is dominated by the result: 4 bytes a state.
     """
     unit = problem.greatest_step_cost
-    transitions = _transitions(problem.terms, grid, unit)
-    columns = _columns(problem.terms, grid.angle_count, grid.angle_origin_deg)
-    arrival = (problem.terms.speed_weight * grid.speeds_deg_s**2 / unit).astype(np.float32)
-    costs = _solve(*columns, np.float32(1.0 / unit), transitions, arrival)
+    transitions = lay_out_transitions(problem.terms, grid, unit)
+    columns = lay_out_columns(problem.terms, grid, unit)
+    arrival = arrival_costs(problem.terms, grid, unit)
+    costs = _solve(*columns, transitions, arrival)
     return CostToGo(grid, costs, unit)
+
+
+def arrival_costs(terms: Terms, grid: Grid, unit: float) -> CostArray:
+    """Return the second term of Eq. (5) for each speed of the grid."""
+    return (speed_cost(terms.speed_weight, 1.0) / unit * grid.speeds_deg_s**2).astype(np.float32)
 
 
 @kernel
@@ -172,9 +185,20 @@ def cost_from(costs: CostArray, grid: Grid, column: int, speed: int, angle_deg: 
 
 
 @kernel
-def _transitions(
-    terms: Terms, grid: Grid, unit: float
-) -> _Transitions:
+def cost_from_any_speed(costs: CostArray, grid: Grid, column: int, speed_deg_s: float, angle_deg: float) -> float:
+    """Return the cost-to-go, interpolated between two speeds of the grid too; infinite where either has no way on."""
+    position = min(max(speed_deg_s / grid.speed_step_deg_s + grid.half_count, 0.0), costs.shape[1] - 1.0)
+    below, above = sample_at_or_below(position), sample_at_or_above(position)
+    lower = cost_from(costs, grid, column, below, angle_deg)
+    if above <= below:
+        return lower
+    upper = cost_from(costs, grid, column, above, angle_deg)
+    return lower + (position - below) * (upper - lower) if max(lower, upper) < np.inf else np.inf
+
+
+@kernel
+def lay_out_transitions(terms: Terms, grid: Grid, unit: float) -> Transitions:
+    """Return what each step of the grid does; steps that leave it go to a row where all is unreachable."""
     angle_count, _, speed_step_deg_s, half_count, jumps = grid
     speeds = 2 * half_count + 1
     shape = (speeds, (len(jumps) + JUMPS_AT_A_TIME - 1) // JUMPS_AT_A_TIME * JUMPS_AT_A_TIME)
@@ -204,27 +228,29 @@ def _transitions(
             start[i, a] = int(first) % angle_count
             length[i, a] = min(int(last - first), angle_count)
             cost[i, a] = acceleration_cost(terms.acceleration_weight, acceleration) / unit
-    return _Transitions(target, shift, fraction, start, length, cost)
+    return Transitions(target, shift, fraction, start, length, cost)
 
 
 @kernel
-def _columns(terms: Terms, angle_count: int, origin_deg: float) -> tuple[FloatArray, IndexArray]:
-    """Return 1 - f_R at every node (infinite where forbidden), and how far one may sweep upwards from it in each step.
+def lay_out_columns(terms: Terms, grid: Grid, unit: float) -> tuple[CostArray, RunArray]:
+    """Return 1 - f_R at every node (unreachable where forbidden), and how far one may sweep upwards in each step.
 
-    The second counts cells: 0 where only the node itself is allowed, -1 where not even that.
+    Returns:
+        The (n + 1, n_angles) costs in units, and the (n, n_angles) counts of cells that may be swept from a node: 0
+        where only the node itself is allowed, -1 where not even that.
     """
-    steps = len(terms.values) - 1
+    steps, angle_count = len(terms.values) - 1, grid.angle_count
     step_deg = 360.0 / angle_count
-    node_cost = np.empty((steps + 1, angle_count))
-    sweep = np.empty((steps, angle_count), dtype=np.int64)
+    node_cost = np.empty((steps + 1, angle_count), dtype=np.float32)
+    sweep = np.empty((steps, angle_count), dtype=np.int32)
     for k in range(steps + 1):
         for m in range(angle_count):
-            value = column_value(terms.values, terms.epsilon, k, origin_deg + m * step_deg)
-            node_cost[k, m] = value_cost(value) if value > terms.epsilon else np.inf
+            value = column_value(terms.values, terms.epsilon, k, grid.angle_origin_deg + m * step_deg)
+            node_cost[k, m] = value_cost(value) / unit if value > terms.epsilon else UNREACHABLE
     for k in range(steps):
         run = 0
         for m in range(2 * angle_count - 1, -1, -1):
-            angle = origin_deg + m * step_deg
+            angle = grid.angle_origin_deg + m * step_deg
             run = run + 1 if crossing_is_allowed(terms.runs, k, angle, angle + step_deg) else 0
             if m < angle_count:
                 is_open = run > 0 or crossing_is_allowed(terms.runs, k, angle, angle)
@@ -234,53 +260,97 @@ def _columns(terms: Terms, angle_count: int, origin_deg: float) -> tuple[FloatAr
 
 @kernel
 def _solve(
-    node_cost: FloatArray, sweep: IndexArray, scale: float, transitions: _Transitions, arrival_cost: CostArray
+    node_cost: CostArray, sweep: RunArray, transitions: Transitions, arrival_cost: CostArray
 ) -> CostArray:
     steps, angles = sweep.shape
-    speeds = len(arrival_cost)
-    width = (angles + LANES - 1) // LANES * LANES
-    costs = np.empty((steps + 1, speeds, angles), dtype=np.float32)
+    costs = np.empty((steps + 1, len(arrival_cost), angles), dtype=np.float32)
     costs[steps] = 0.0
-    arrivals = np.full((speeds + 1, width + angles + 1), UNREACHABLE)
-    barriers = np.empty((transitions.sweep_length.max() + 1, width + angles + 1), dtype=np.float32)
-    best = np.empty(width, dtype=np.float32)
+    workspace = make_workspace(angles, transitions)
     for k in range(steps - 1, -1, -1):
-        _lay_out_arrivals(costs[k + 1], node_cost[k + 1], scale, arrival_cost, arrivals)
-        _lay_out_barriers(sweep[k], barriers)
-        for i in range(speeds):
-            _leave(i, arrivals, barriers, transitions, best)
-            for m in range(angles):
-                costs[k, i, m] = best[m] if best[m] < ANY_COST else UNREACHABLE
+        step_back(
+            costs[k + 1], node_cost[k + 1], sweep[k], transitions, arrival_cost, NO_PAUSE, workspace, costs[k]
+        )
     return costs
 
 
 @kernel
-def _lay_out_arrivals(
-    later: CostArray, node_cost: FloatArray, scale: float, arrival_cost: CostArray, arrivals: CostArray
-) -> None:
-    """Write, periodically continued, what it costs to arrive in the next column and to go on from there."""
-    angles = len(node_cost)
-    for j in range(len(arrival_cost)):
-        for m in range(angles):
-            total = np.float32(node_cost[m] * scale) + arrival_cost[j] + later[j, m]
-            arrivals[j, m] = min(total, UNREACHABLE)
-        for m in range(angles, arrivals.shape[1]):
-            arrivals[j, m] = arrivals[j, m - angles]
+def make_workspace(angle_count: int, transitions: Transitions) -> Workspace:
+    """Return the arrays that `step_back` uses inside."""
+    width = (angle_count + LANES - 1) // LANES * LANES
+    arrivals = np.full((len(transitions.target) + 1, width + angle_count + 1), UNREACHABLE)
+    barriers = np.empty((transitions.sweep_length.max() + 1, width + angle_count + 1), dtype=np.float32)
+    return Workspace(arrivals, barriers, np.empty(width, dtype=np.float32))
 
 
 @kernel
-def _lay_out_barriers(sweep: IndexArray, barriers: CostArray) -> None:
+def step_back(
+    later: CostArray,
+    node_cost: CostArray,
+    sweep: RunArray,
+    transitions: Transitions,
+    arrival_cost: CostArray,
+    pause_price: float,
+    workspace: Workspace,
+    earlier: CostArray,
+) -> None:
+    """Write the cost-to-go of a column, given that of the next.
+
+    Args:
+        later: (n_speeds, n_angles) cost-to-go of the next column.
+        node_cost: (n_angles,) 1 - f_R there, in units.
+        sweep: (n_angles,) how many cells one may sweep upwards from each angle in between.
+        transitions: what the steps do.
+        arrival_cost: (n_speeds,) second term of Eq. (5).
+        pause_price: units of cost for stopping the scan and going on at rest at any angle; NO_PAUSE rules that out.
+        workspace: is overwritten.
+        earlier: (n_speeds, n_angles) receives the result.
+    """
+    arrivals, barriers, best = workspace
+    _lay_out_arrivals(later, node_cost, arrival_cost, arrivals)
+    _lay_out_barriers(sweep, barriers)
+    at_rest = arrivals[len(arrival_cost) // 2, : len(node_cost)]
+    after_pause = np.float32(at_rest.min() + pause_price)
+    for speed in range(len(arrival_cost)):
+        _leave(speed, arrivals, barriers, transitions, best)
+        for m in range(len(sweep)):
+            cost = min(best[m], after_pause)
+            earlier[speed, m] = cost if cost < ANY_COST else UNREACHABLE
+
+
+@kernel
+def _lay_out_arrivals(later: CostArray, node_cost: CostArray, arrival_cost: CostArray, arrivals: CostArray) -> None:
+    """Write, periodically continued, what it costs to arrive in the next column and to go on from there."""
+    angles = len(node_cost)
+    for j in range(len(arrival_cost)):
+        row, onward, cost = arrivals[j], later[j], arrival_cost[j]
+        for m in range(angles):
+            row[m] = min(node_cost[m] + cost + onward[m], UNREACHABLE)
+        _continue_periodically(row, angles)
+
+
+@kernel
+def _lay_out_barriers(sweep: RunArray, barriers: CostArray) -> None:
     """Write, per length of the sweep and its first sample, 0 where it is allowed and infinity where it is not."""
     for length in range(len(barriers)):
+        row = barriers[length]
         for m in range(len(sweep)):
-            barriers[length, m] = 0.0 if sweep[m] >= length else UNREACHABLE
-        for m in range(len(sweep), barriers.shape[1]):
-            barriers[length, m] = barriers[length, m - len(sweep)]
+            row[m] = 0.0 if sweep[m] >= length else UNREACHABLE
+        _continue_periodically(row, len(sweep))
+
+
+@kernel
+def _continue_periodically(row: CostArray, period: int) -> None:
+    done = period
+    while done < len(row):
+        count = min(period, len(row) - done)
+        for m in range(count):
+            row[done + m] = row[m]
+        done += count
 
 
 @kernel
 def _leave(
-    speed: int, arrivals: CostArray, barriers: CostArray, transitions: _Transitions, best: CostArray
+    speed: int, arrivals: CostArray, barriers: CostArray, transitions: Transitions, best: CostArray
 ) -> None:
     """Write the least cost of leaving a speed, by any of its jumps, for each angle.
 

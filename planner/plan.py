@@ -10,7 +10,8 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.config_map import column_value
 from planner.cost import PathCost, acceleration_cost, speed_cost, value_cost
-from planner.problem import Problem
+from planner.kernel import kernel
+from planner.problem import Problem, Terms
 
 
 class Pause(NamedTuple):
@@ -85,6 +86,15 @@ class Plan:
 Outcome = Plan | NoPlan
 
 
+@kernel
+def values_along(terms: Terms, angles_deg: FloatArray) -> FloatArray:
+    """Return f_R at each location, 0 where it is forbidden."""
+    values = np.empty(len(angles_deg))
+    for k in range(len(angles_deg)):
+        values[k] = column_value(terms.values, terms.epsilon, k, angles_deg[k])
+    return values
+
+
 def path_cost(
     problem: Problem,
     angles_deg: FloatArray,
@@ -96,7 +106,7 @@ def path_cost(
     terms = problem.terms
     moving = np.ones(problem.step_count, dtype=np.bool_)
     moving[[pause.step for pause in pauses]] = False
-    values = np.array([column_value(terms.values, terms.epsilon, k, a) for k, a in enumerate(angles_deg) if k > 0])
+    values = values_along(terms, angles_deg)[1:]
     return PathCost(
         acceleration=float(acceleration_cost(terms.acceleration_weight, accelerations_deg_s2)[moving].sum()),
         speed=float(speed_cost(terms.speed_weight, speeds_deg_s[1:])[moving].sum()),

@@ -8,7 +8,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.config_map import column_value
 from planner.cost import acceleration_cost, speed_cost, value_cost
-from planner.cost_to_go import CostArray, CostToGo, Grid, cost_from, cost_to_go, default_grid
+from planner.cost_to_go import CostArray, CostToGo, Grid, cost_from_any_speed, cost_to_go, default_grid
 from planner.crossing import step_is_allowed
 from planner.errors import PlannerError
 from planner.kernel import kernel
@@ -26,6 +26,10 @@ class Rays(NamedTuple):
 
     count: int = 21
     horizon: int = 30
+
+
+# What lies behind the horizon is known then, and a ray is straight where the best motion is not: it should be short.
+GUIDED_RAYS = Rays(horizon=2)
 
 
 class RayError(PlannerError):
@@ -55,7 +59,7 @@ def ray_shooting(problem: Problem, rays: Rays | None = None) -> Outcome:
 
 def guided_ray_shooting(problem: Problem, rays: Rays | None = None) -> Outcome:
     """Return the plan of ray shooting whose rays end in the cost-to-go, so that they see beyond their horizon."""
-    return _shoot(problem, rays or Rays(), GUIDED_NAME, lambda asked: cost_to_go(asked, default_grid(asked)))
+    return _shoot(problem, rays or GUIDED_RAYS, GUIDED_NAME, lambda asked: cost_to_go(asked, default_grid(asked)))
 
 
 def _shoot(problem: Problem, rays: Rays, name: str, terminal: Callable[[Problem], CostToGo]) -> Outcome:
@@ -145,14 +149,14 @@ def ray_cost(
 ) -> float:
     """Return what `evalpath` returns: the cost of a ray from column + 1 to `last`, both included.
 
-    Once it leaves the allowed region, at a column or between two, each remaining step costs C_pen. The speed saturates
-    at its limit. No term is negative, so a ray that already costs `bound` is not followed further.
+    Once it leaves the allowed region, at a column or between two, each remaining step costs C_pen: those to `last`, or
+    to the end of the map where a cost-to-go accounts for them. The speed saturates at its limit. No term is negative, so a ray that already costs `bound` is not followed further.
     """
     cost = 0.0
     for k in range(column, last):
         a = limited_acceleration(speed_deg_s, acceleration_deg_s2, terms.step_s, terms.speed_limit_deg_s)
         if not step_is_allowed(terms.runs, k, angle_deg, speed_deg_s, a, terms.step_s):
-            return cost + terms.pause_cost * (last - k)
+            return cost + terms.pause_cost * (max(last, len(costs) - 1) - k)
         angle_deg = next_angle(angle_deg, speed_deg_s, a, terms.step_s)
         speed_deg_s = next_speed(speed_deg_s, a, terms.step_s)
         value = column_value(terms.values, terms.epsilon, k + 1, angle_deg)
@@ -170,10 +174,6 @@ def ray_cost(
 def _terminal_cost(
     terms: Terms, costs: CostArray, grid: Grid, unit: float, column: int, angle_deg: float, speed_deg_s: float
 ) -> float:
-    """Return the cost-to-go, also between two speeds of its grid; C_pen for each column left where there is no way."""
-    position = min(max(speed_deg_s / grid.speed_step_deg_s + grid.half_count, 0.0), costs.shape[1] - 1.0)
-    below = min(int(position), costs.shape[1] - 2)
-    lower = cost_from(costs, grid, column, below, angle_deg)
-    upper = cost_from(costs, grid, column, below + 1, angle_deg)
-    cost = unit * (lower + (position - below) * (upper - lower)) if max(lower, upper) < np.inf else np.inf
+    """Return the cost-to-go; where there is no way on, C_pen for each column left."""
+    cost = unit * cost_from_any_speed(costs, grid, column, speed_deg_s, angle_deg)
     return min(cost, terms.pause_cost * (len(costs) - 1 - column))
