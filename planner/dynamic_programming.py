@@ -6,6 +6,7 @@ exact cost, and the cheapest continuation is taken. Where the interpolated cost-
 motion does not have, the roll-out steps back and takes the next best.
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.config_map import ConfigurationMap, column_value
 from planner.cost import acceleration_cost, speed_cost, value_cost
-from planner.cost_to_go import CostArray, CostToGo, Grid, cost_from, cost_to_go, default_grid, exact_grid
+from planner.cost_to_go import CostToGo, Grid, cost_from, cost_to_go, default_grid, exact_grid
 from planner.crossing import step_is_allowed
 from planner.kernel import kernel
 from planner.motion import next_angle, next_speed, roll_out
@@ -28,8 +29,8 @@ STEPS_BACK_PER_COLUMN = 50
 # A free start is looked for at so many angles per sample of the map.
 STARTS_PER_SAMPLE = 4
 
-# Beyond this the grid without interpolation would no longer fit into a few hundred megabytes.
-FINEST_REFINEMENT = 40
+# Beyond so many states the grid without interpolation would take more than 200 MB.
+MOST_STATES = 50_000_000
 
 
 def dynamic_programming(problem: Problem, grid: Grid | None = None) -> Outcome:
@@ -51,16 +52,16 @@ def dynamic_programming(problem: Problem, grid: Grid | None = None) -> Outcome:
 def fine_grid(problem: Problem) -> Grid:
     """Return the exact grid that has four changes of speed each way; where that is too fine, an interpolated one."""
     step_deg = problem.limits.acceleration_deg_s2 * problem.step_s**2 / 8.0
-    refinement = int(np.ceil(problem.map.angle_step_deg / step_deg))
-    if refinement <= FINEST_REFINEMENT:
-        return exact_grid(problem, refinement)
+    exact = exact_grid(problem, math.ceil(problem.map.angle_step_deg / step_deg))
+    if problem.map.location_count * len(exact.speeds_deg_s) * exact.angle_count <= MOST_STATES:
+        return exact
     return default_grid(problem, refinement=4, speed_count=201, jump_count=41)
 
 
 def follow(problem: Problem, to_go: CostToGo) -> Plan | None:
     """Roll the best motion out along a cost-to-go; None where it finds no way across."""
     for angle_deg, speed_deg_s in _starts(problem, to_go):
-        accelerations = _follow(problem.terms, to_go.costs, to_go.grid, to_go.unit, angle_deg, speed_deg_s)
+        accelerations = _follow(problem.terms, to_go, angle_deg, speed_deg_s)
         if len(accelerations) == problem.step_count:
             angles, speeds = roll_out(angle_deg, speed_deg_s, accelerations, problem.step_s)
             return make_plan(problem, NAME, angles, speeds, accelerations)
@@ -76,7 +77,7 @@ def _starts(problem: Problem, to_go: CostToGo, count: int = 3) -> list[tuple[flo
         angles = np.array([problem.start_angle_deg], dtype=np.float64)
     free_speed = problem.start_speed_deg_s is None
     speeds = to_go.grid.speeds_deg_s if free_speed else np.array([problem.start_speed_deg_s], dtype=np.float64)
-    costs = _start_costs(problem.terms, to_go.costs, to_go.grid, to_go.unit, angles, speeds)
+    costs = _start_costs(problem.terms, to_go, angles, speeds)
     order = np.argsort(costs, axis=None, kind="stable")[:count]
     rows, columns = np.unravel_index(order, costs.shape)
     return [(float(angles[i]), float(speeds[j])) for i, j in zip(rows, columns, strict=True) if np.isfinite(costs[i, j])]
@@ -84,25 +85,26 @@ def _starts(problem: Problem, to_go: CostToGo, count: int = 3) -> list[tuple[flo
 
 @kernel
 def _start_costs(
-    terms: Terms, costs: CostArray, grid: Grid, unit: float, angles_deg: FloatArray, speeds_deg_s: FloatArray
+    terms: Terms, to_go: CostToGo, angles_deg: FloatArray, speeds_deg_s: FloatArray
 ) -> FloatArray:
     result = np.full((len(angles_deg), len(speeds_deg_s)), np.inf)
     for i in range(len(angles_deg)):
         if column_value(terms.values, terms.epsilon, 0, angles_deg[i]) > terms.epsilon:
             for j in range(len(speeds_deg_s)):
-                continuations = continuation_costs(terms, costs, grid, unit, 0, angles_deg[i], speeds_deg_s[j])
+                continuations = continuation_costs(terms, to_go, 0, angles_deg[i], speeds_deg_s[j])
                 result[i, j] = continuations.min()
     return result
 
 
 @kernel
 def continuation_costs(
-    terms: Terms, costs: CostArray, grid: Grid, unit: float, column: int, angle_deg: float, speed_deg_s: float
+    terms: Terms, to_go: CostToGo, column: int, angle_deg: float, speed_deg_s: float
 ) -> FloatArray:
     """Return, per speed of the grid, what it costs to reach it in the next column and to go on to the last.
 
     Infinite where the acceleration exceeds its limit, the way there is forbidden or there is no way on.
     """
+    grid, costs = to_go.grid, to_go.costs
     result = np.full(costs.shape[1], np.inf)
     gain = terms.acceleration_limit_deg_s2 * terms.step_s / grid.speed_step_deg_s
     now = speed_deg_s / grid.speed_step_deg_s + grid.half_count
@@ -111,14 +113,14 @@ def continuation_costs(
     for j in range(first, last + 1):
         acceleration = acceleration_to(terms, grid, speed_deg_s, j)
         angle = next_angle(angle_deg, speed_deg_s, acceleration, terms.step_s)
-        to_go = cost_from(costs, grid, column + 1, j, angle)
-        if to_go < np.inf and step_is_allowed(terms.runs, column, angle_deg, speed_deg_s, acceleration, terms.step_s):
+        onward = cost_from(costs, grid, column + 1, j, angle)
+        if onward < np.inf and step_is_allowed(terms.runs, column, angle_deg, speed_deg_s, acceleration, terms.step_s):
             value = column_value(terms.values, terms.epsilon, column + 1, angle)
             result[j] = (
                 acceleration_cost(terms.acceleration_weight, acceleration)
                 + speed_cost(terms.speed_weight, next_speed(speed_deg_s, acceleration, terms.step_s))
                 + value_cost(value)
-                + to_go * unit
+                + onward * to_go.unit
             )
     return result
 
@@ -133,17 +135,17 @@ def acceleration_to(terms: Terms, grid: Grid, speed_deg_s: float, target: int) -
 
 @kernel
 def _follow(
-    terms: Terms, costs: CostArray, grid: Grid, unit: float, angle_deg: float, speed_deg_s: float
+    terms: Terms, to_go: CostToGo, angle_deg: float, speed_deg_s: float
 ) -> FloatArray:
     """Return the (n,) accelerations of the best motion from a start; fewer where it finds no way across."""
-    steps = len(costs) - 1
+    steps = len(to_go.costs) - 1
     angles, speeds, accelerations = np.empty(steps + 1), np.empty(steps + 1), np.empty(steps)
     angles[0], speeds[0] = angle_deg, speed_deg_s
     rank = np.zeros(steps + 1, dtype=np.int64)
     steps_back = STEPS_BACK_PER_COLUMN * steps
     k = 0
     while 0 <= k < steps and steps_back >= 0:
-        continuations = continuation_costs(terms, costs, grid, unit, k, angles[k], speeds[k])
+        continuations = continuation_costs(terms, to_go, k, angles[k], speeds[k])
         target = _of_rank(continuations, rank[k])
         if target < 0:
             steps_back -= 1
@@ -151,7 +153,7 @@ def _follow(
             if k >= 0:
                 rank[k] += 1
             continue
-        accelerations[k] = acceleration_to(terms, grid, speeds[k], target)
+        accelerations[k] = acceleration_to(terms, to_go.grid, speeds[k], target)
         angles[k + 1] = next_angle(angles[k], speeds[k], accelerations[k], terms.step_s)
         speeds[k + 1] = next_speed(speeds[k], accelerations[k], terms.step_s)
         k += 1

@@ -8,7 +8,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.config_map import column_value
 from planner.cost import acceleration_cost, speed_cost, value_cost
-from planner.cost_to_go import CostArray, CostToGo, Grid, cost_from_any_speed, cost_to_go, default_grid
+from planner.cost_to_go import CostToGo, Grid, cost_from_any_speed, cost_to_go, default_grid
 from planner.crossing import step_is_allowed
 from planner.errors import PlannerError
 from planner.kernel import kernel
@@ -54,7 +54,7 @@ def ray_shooting(problem: Problem, rays: Rays | None = None) -> Outcome:
 
     A free start is at rest at the brightest angle of the first location.
     """
-    return _shoot(problem, rays or Rays(), NAME, _no_cost_to_go)
+    return _shoot(problem, rays or Rays(), NAME, no_cost_to_go)
 
 
 def guided_ray_shooting(problem: Problem, rays: Rays | None = None) -> Outcome:
@@ -72,13 +72,14 @@ def _shoot(problem: Problem, rays: Rays, name: str, terminal: Callable[[Problem]
     to_go = terminal(problem)
     angle_deg, speed_deg_s = greedy_start(problem)
     angles, speeds, chosen, paused = _algorithm_2(
-        problem.terms, accelerations, rays.horizon, to_go.costs, to_go.grid, to_go.unit, angle_deg, speed_deg_s
+        problem.terms, accelerations, rays.horizon, to_go, angle_deg, speed_deg_s
     )
     pauses = [Pause(int(k), float(angles[k]), float(angles[k + 1])) for k in np.flatnonzero(paused)]
     return make_plan(problem, name, angles, speeds, chosen, pauses)
 
 
-def _no_cost_to_go(problem: Problem) -> CostToGo:
+def no_cost_to_go(problem: Problem) -> CostToGo:
+    """Return the empty cost-to-go of plain ray shooting."""
     grid = Grid(problem.map.angle_count, 0.0, problem.limits.speed_deg_s, 1, np.zeros(1, dtype=np.int64))
     return CostToGo(grid, np.empty((0, 3, problem.map.angle_count), dtype=np.float32), 1.0)
 
@@ -88,9 +89,7 @@ def _algorithm_2(
     terms: Terms,
     accelerations: FloatArray,
     horizon: int,
-    costs: CostArray,
-    grid: Grid,
-    unit: float,
+    to_go: CostToGo,
     angle_deg: float,
     speed_deg_s: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -99,7 +98,7 @@ def _algorithm_2(
     chosen, paused = np.zeros(steps), np.zeros(steps)
     angles[0], speeds[0] = angle_deg, speed_deg_s
     for k in range(steps):
-        best = cheapest_ray(terms, accelerations, k, horizon, costs, grid, unit, angles[k], speeds[k])
+        best = cheapest_ray(terms, accelerations, k, horizon, to_go, angles[k], speeds[k])
         a = limited_acceleration(speeds[k], accelerations[best], terms.step_s, terms.speed_limit_deg_s)
         if step_is_allowed(terms.runs, k, angles[k], speeds[k], a, terms.step_s):
             chosen[k] = a
@@ -118,9 +117,7 @@ def cheapest_ray(
     accelerations: FloatArray,
     column: int,
     horizon: int,
-    costs: CostArray,
-    grid: Grid,
-    unit: float,
+    to_go: CostToGo,
     angle_deg: float,
     speed_deg_s: float,
 ) -> int:
@@ -128,7 +125,7 @@ def cheapest_ray(
     last = min(column + horizon, len(terms.values) - 1)
     best, least = 0, np.inf
     for i in range(len(accelerations)):
-        cost = ray_cost(terms, accelerations[i], column, last, costs, grid, unit, angle_deg, speed_deg_s, least)
+        cost = ray_cost(terms, accelerations[i], column, last, to_go, angle_deg, speed_deg_s, least)
         if cost < least:
             best, least = i, cost
     return best
@@ -140,9 +137,7 @@ def ray_cost(
     acceleration_deg_s2: float,
     column: int,
     last: int,
-    costs: CostArray,
-    grid: Grid,
-    unit: float,
+    to_go: CostToGo,
     angle_deg: float,
     speed_deg_s: float,
     bound: float,
@@ -156,7 +151,7 @@ def ray_cost(
     for k in range(column, last):
         a = limited_acceleration(speed_deg_s, acceleration_deg_s2, terms.step_s, terms.speed_limit_deg_s)
         if not step_is_allowed(terms.runs, k, angle_deg, speed_deg_s, a, terms.step_s):
-            return cost + terms.pause_cost * (max(last, len(costs) - 1) - k)
+            return cost + terms.pause_cost * (max(last, len(to_go.costs) - 1) - k)
         angle_deg = next_angle(angle_deg, speed_deg_s, a, terms.step_s)
         speed_deg_s = next_speed(speed_deg_s, a, terms.step_s)
         value = column_value(terms.values, terms.epsilon, k + 1, angle_deg)
@@ -165,15 +160,15 @@ def ray_cost(
         cost += value_cost(value)
         if cost >= bound:
             return cost
-    if len(costs) == 0:
+    if len(to_go.costs) == 0:
         return cost
-    return cost + _terminal_cost(terms, costs, grid, unit, last, angle_deg, speed_deg_s)
+    return cost + _terminal_cost(terms, to_go, last, angle_deg, speed_deg_s)
 
 
 @kernel
 def _terminal_cost(
-    terms: Terms, costs: CostArray, grid: Grid, unit: float, column: int, angle_deg: float, speed_deg_s: float
+    terms: Terms, to_go: CostToGo, column: int, angle_deg: float, speed_deg_s: float
 ) -> float:
     """Return the cost-to-go; where there is no way on, C_pen for each column left."""
-    cost = unit * cost_from_any_speed(costs, grid, column, speed_deg_s, angle_deg)
-    return min(cost, terms.pause_cost * (len(costs) - 1 - column))
+    cost = to_go.unit * cost_from_any_speed(to_go.costs, to_go.grid, column, speed_deg_s, angle_deg)
+    return min(cost, terms.pause_cost * (len(to_go.costs) - 1 - column))
