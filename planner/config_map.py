@@ -106,7 +106,9 @@ class ConfigurationMap:
         values = np.array(self.values, dtype=np.float64, order="C")
         _check_values(values)
         if not 0.0 <= self.epsilon < 1.0:
-            raise ConfigurationMapError(f"the map's epsilon is {self.epsilon}; allowed is 0 up to, but not including, 1")
+            raise ConfigurationMapError(
+                f"the map's epsilon is {self.epsilon}; allowed is 0 up to, but not including, 1"
+            )
         values.setflags(write=False)
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
@@ -146,7 +148,9 @@ class ConfigurationMap:
     def value(self, location: float, angle_deg: float) -> float:
         """Return the interpolated f_R at a point of the map (see `map_value`); 0 where it is forbidden."""
         if not 0.0 <= location <= self.location_count - 1:
-            raise ConfigurationMapError(f"location {location} is off the map; allowed is 0 to {self.location_count - 1}")
+            raise ConfigurationMapError(
+                f"location {location} is off the map; allowed is 0 to {self.location_count - 1}"
+            )
         return float(map_value(self.values, self.epsilon, float(location), float(angle_deg)))
 
     def is_allowed(self, location: float, angle_deg: float) -> bool:
@@ -162,12 +166,16 @@ def _check_values(values: FloatArray) -> None:
     wrong = ~((values >= 0.0) & (values <= 1.0))
     if wrong.any():
         k, i = (int(index) for index in np.argwhere(wrong)[0])
-        raise ConfigurationMapError(f"the map's value at location {k}, angle index {i} is {values[k, i]}; allowed is 0 to 1")
+        raise ConfigurationMapError(
+            f"the map's value at location {k}, angle index {i} is {values[k, i]}; allowed is 0 to 1"
+        )
 
 
 def _frozen_reasons(reasons: ReasonArray, shape: tuple[int, ...]) -> ReasonArray:
     frozen = np.array(reasons, dtype=np.uint8, order="C")
     if frozen.shape != shape:
-        raise ConfigurationMapError(f"the map's reasons have shape {frozen.shape}; they need that of its values, {shape}")
+        raise ConfigurationMapError(
+            f"the map's reasons have shape {frozen.shape}; they need that of its values, {shape}"
+        )
     frozen.setflags(write=False)
     return frozen

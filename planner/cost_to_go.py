@@ -259,17 +259,13 @@ def lay_out_columns(terms: Terms, grid: Grid, unit: float) -> tuple[CostArray, R
 
 
 @kernel
-def _solve(
-    node_cost: CostArray, sweep: RunArray, transitions: Transitions, arrival_cost: CostArray
-) -> CostArray:
+def _solve(node_cost: CostArray, sweep: RunArray, transitions: Transitions, arrival_cost: CostArray) -> CostArray:
     steps, angles = sweep.shape
     costs = np.empty((steps + 1, len(arrival_cost), angles), dtype=np.float32)
     costs[steps] = 0.0
     workspace = make_workspace(angles, transitions)
     for k in range(steps - 1, -1, -1):
-        step_back(
-            costs[k + 1], node_cost[k + 1], sweep[k], transitions, arrival_cost, NO_PAUSE, workspace, costs[k]
-        )
+        step_back(costs[k + 1], node_cost[k + 1], sweep[k], transitions, arrival_cost, NO_PAUSE, workspace, costs[k])
     return costs
 
 
@@ -349,9 +345,7 @@ def _continue_periodically(row: CostArray, period: int) -> None:
 
 
 @kernel
-def _leave(
-    speed: int, arrivals: CostArray, barriers: CostArray, transitions: Transitions, best: CostArray
-) -> None:
+def _leave(speed: int, arrivals: CostArray, barriers: CostArray, transitions: Transitions, best: CostArray) -> None:
     """Write the least cost of leaving a speed, by any of its jumps, for each angle.
 
     Three jumps at a time share what it costs to enter the innermost loop.

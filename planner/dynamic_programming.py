@@ -80,13 +80,13 @@ def _starts(problem: Problem, to_go: CostToGo, count: int = 3) -> list[tuple[flo
     costs = _start_costs(problem.terms, to_go, angles, speeds)
     order = np.argsort(costs, axis=None, kind="stable")[:count]
     rows, columns = np.unravel_index(order, costs.shape)
-    return [(float(angles[i]), float(speeds[j])) for i, j in zip(rows, columns, strict=True) if np.isfinite(costs[i, j])]
+    return [
+        (float(angles[i]), float(speeds[j])) for i, j in zip(rows, columns, strict=True) if np.isfinite(costs[i, j])
+    ]
 
 
 @kernel
-def _start_costs(
-    terms: Terms, to_go: CostToGo, angles_deg: FloatArray, speeds_deg_s: FloatArray
-) -> FloatArray:
+def _start_costs(terms: Terms, to_go: CostToGo, angles_deg: FloatArray, speeds_deg_s: FloatArray) -> FloatArray:
     result = np.full((len(angles_deg), len(speeds_deg_s)), np.inf)
     for i in range(len(angles_deg)):
         if column_value(terms.values, terms.epsilon, 0, angles_deg[i]) > terms.epsilon:
@@ -97,9 +97,7 @@ def _start_costs(
 
 
 @kernel
-def continuation_costs(
-    terms: Terms, to_go: CostToGo, column: int, angle_deg: float, speed_deg_s: float
-) -> FloatArray:
+def continuation_costs(terms: Terms, to_go: CostToGo, column: int, angle_deg: float, speed_deg_s: float) -> FloatArray:
     """Return, per speed of the grid, what it costs to reach it in the next column and to go on to the last.
 
     Infinite where the acceleration exceeds its limit, the way there is forbidden or there is no way on.
@@ -134,9 +132,7 @@ def acceleration_to(terms: Terms, grid: Grid, speed_deg_s: float, target: int) -
 
 
 @kernel
-def _follow(
-    terms: Terms, to_go: CostToGo, angle_deg: float, speed_deg_s: float
-) -> FloatArray:
+def _follow(terms: Terms, to_go: CostToGo, angle_deg: float, speed_deg_s: float) -> FloatArray:
     """Return the (n,) accelerations of the best motion from a start; fewer where it finds no way across."""
     steps = len(to_go.costs) - 1
     angles, speeds, accelerations = np.empty(steps + 1), np.empty(steps + 1), np.empty(steps)

@@ -166,9 +166,7 @@ def ray_cost(
 
 
 @kernel
-def _terminal_cost(
-    terms: Terms, to_go: CostToGo, column: int, angle_deg: float, speed_deg_s: float
-) -> float:
+def _terminal_cost(terms: Terms, to_go: CostToGo, column: int, angle_deg: float, speed_deg_s: float) -> float:
     """Return the cost-to-go; where there is no way on, C_pen for each column left."""
     cost = to_go.unit * cost_from_any_speed(to_go.costs, to_go.grid, column, speed_deg_s, angle_deg)
     return min(cost, terms.pause_cost * (len(to_go.costs) - 1 - column))

@@ -49,7 +49,12 @@ def smooth(problem: Problem, plan: Plan) -> Plan:
 
 @kernel
 def _sweep(
-    terms: Terms, fixed: BoolArray, blocks: IndexArray, angles: FloatArray, speeds: FloatArray, accelerations: FloatArray
+    terms: Terms,
+    fixed: BoolArray,
+    blocks: IndexArray,
+    angles: FloatArray,
+    speeds: FloatArray,
+    accelerations: FloatArray,
 ) -> int:
     """Try one wave of each length at each place; change the motion in place and return how many were accepted."""
     accepted = 0
