@@ -1,0 +1,281 @@
+"""Clearance of the arm, the probe and its beam from each other and from the cell (section 3 of the paper).
+
+The clearance of a pose is the least signed distance of all pairs that can meet, so that the value function can grade
+proximity, and the pair that has it is the reason where it is too small. The beam is a light ray and not a body: near
+is fine, so it counts only where something blocks it.
+"""
+
+from collections.abc import Sequence
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from planner.arm import Arm, link_frames
+from planner.arrays import FloatArray
+from planner.bodies import FLANGE_FRAME, WRIST_LINK, Bodies
+from planner.capsule import segment_distance
+from planner.kernel import kernel
+from planner.obstacles import FIELD, Obstacle
+from planner.signed_distance_field import NO_FIELD, SignedDistanceField, field_distance
+from planner.solid import solid_distance
+from planner.transforms import rotations_z
+
+IndexArray = npt.NDArray[np.int64]
+
+_FIXED_LINK = 0
+_BEAM = "beam"
+
+
+# The columns of the bodies' table: the frame that a body moves with, its ends there in mm, its radius in mm.
+_FRAME, _START, _END, _RADIUS = 0, 1, 4, 7
+
+
+class CollisionModel(NamedTuple):
+    """What can collide with what, in the plain arrays that compiled kernels take; lengths in mm.
+
+    A body is a part, or, as the last one, the beam. An obstacle is numbered after the bodies.
+
+    Attributes:
+        bodies: `(n_bodies, 8)`, one row each; the beam's ends are one mm apart.
+        obstacles: `(n_obstacles, 4)`, the kind and three sizes.
+        field: Of the one obstacle that is a mesh.
+        pairs: `(n_pairs, 2)`, a body and another one or an obstacle. Those of the flange's bodies with the obstacles
+            come first: they are common to all configurations.
+        n_common: How many those are.
+        poses: `(n_obstacles, 4, 4)`, of the obstacles in the table's frame or the base's.
+        turning: `(n_obstacles,)`, which of the two.
+        T_BT: `(4, 4)`, the table's axis at angle 0 in the base.
+        beam_gap_mm: What the beam stops short of the surface.
+    """
+
+    bodies: FloatArray
+    obstacles: FloatArray
+    field: SignedDistanceField
+    pairs: IndexArray
+    n_common: int
+    poses: FloatArray
+    turning: npt.NDArray[np.bool_]
+    T_BT: FloatArray
+    beam_gap_mm: float
+
+    def beam_mm(self, stand_off_mm: float) -> float:
+        """Return the beam's length for a stand-off."""
+        return max(stand_off_mm - self.beam_gap_mm, 0.0)
+
+
+class Clearances(NamedTuple):
+    """The clearance `(n,)` in mm, and the nearest pair `(n,)` as an index into the model's pairs."""
+
+    clearance_mm: FloatArray
+    pair: IndexArray
+
+
+def collision_model(
+    bodies: Bodies, obstacles: Sequence[Obstacle], T_BT: FloatArray, T_FS: FloatArray
+) -> tuple[CollisionModel, tuple[str, ...]]:
+    """Return the model and the name of each of its pairs, such as "probe and table".
+
+    Raises:
+        ValueError: More than one obstacle is a field.
+    """
+    fields = [obstacle.field for obstacle in obstacles if obstacle.field is not None]
+    if len(fields) > 1:
+        raise ValueError(f"{len(fields)} obstacles are meshes, the collision model takes one")
+    pairs, n_common = _pairs(bodies, len(obstacles))
+    beam_start, beam_axis = T_FS[:3, 3], T_FS[:3, 2]
+    model = CollisionModel(
+        bodies=np.array(
+            [
+                *([part.frame, *part.start_mm, *part.end_mm, part.radius_mm] for part in bodies.parts),
+                [FLANGE_FRAME, *beam_start, *(beam_start + beam_axis), bodies.beam.radius_mm],
+            ]
+        ),
+        obstacles=np.array([[obstacle.kind, *obstacle.size_mm] for obstacle in obstacles]).reshape(-1, 4),
+        field=fields[0] if fields else NO_FIELD,
+        pairs=pairs,
+        n_common=n_common,
+        poses=np.array([obstacle.pose for obstacle in obstacles]).reshape(-1, 4, 4),
+        turning=np.array([obstacle.turning for obstacle in obstacles], dtype=np.bool_),
+        T_BT=np.array(T_BT, dtype=np.float64),
+        beam_gap_mm=bodies.beam.gap_mm,
+    )
+    names = [*(part.name for part in bodies.parts), _BEAM, *(obstacle.name for obstacle in obstacles)]
+    return model, tuple(f"{names[first]} and {names[second]}" for first, second in pairs)
+
+
+def _pairs(bodies: Bodies, n_obstacles: int) -> tuple[IndexArray, int]:
+    links = [part.link for part in bodies.parts]
+    beam = len(links)
+    obstacles = range(beam + 1, beam + 1 + n_obstacles)
+    tool = [body for body, link in enumerate(links) if link >= WRIST_LINK]
+    arm = [body for body, link in enumerate(links) if _FIXED_LINK < link < WRIST_LINK]
+    common = [(body, obstacle) for body in (*tool, beam) for obstacle in obstacles]
+    others = [(body, obstacle) for body in arm for obstacle in obstacles]
+    others += [(a, b) for a in range(beam) for b in range(a) if abs(links[a] - links[b]) > 1]
+    others += [(beam, body) for body, link in enumerate(links) if link < WRIST_LINK]
+    return np.array([*common, *others], dtype=np.int64).reshape(-1, 2), len(common)
+
+
+def base_in_obstacles(model: CollisionModel, table_angles_deg: FloatArray) -> FloatArray:
+    """Return `(n_angles, n_obstacles, 3, 4)`: the base's frame seen from each obstacle's, for each table angle."""
+    table = (model.T_BT @ rotations_z(table_angles_deg))[:, None]
+    in_base = np.where(model.turning[:, None, None], table @ model.poses, model.poses)
+    return np.ascontiguousarray(np.linalg.inv(in_base)[:, :, :3])
+
+
+def clearances(
+    model: CollisionModel, arm: Arm, joints: FloatArray, table_angles_deg: FloatArray, stand_off_mm: float
+) -> Clearances:
+    """Return the clearance of each pose, without a bound.
+
+    Args:
+        model: What can collide.
+        arm: The arm.
+        joints: `(n, 6)`, in radians.
+        table_angles_deg: `(n,)`.
+        stand_off_mm: The probe's distance from the surface along its beam.
+    """
+    clearance_mm, pair = np.empty(len(joints)), np.empty(len(joints), dtype=np.int64)
+    _clearance_of_each(
+        arm.table,
+        np.ascontiguousarray(joints),
+        model.beam_mm(stand_off_mm),
+        model.pairs,
+        model.bodies,
+        model.obstacles,
+        *model.field,
+        base_in_obstacles(model, table_angles_deg),
+        clearance_mm,
+        pair,
+    )
+    return Clearances(clearance_mm, pair)
+
+
+# Kernels take numbers and arrays, not the model: each array that is fetched from a tuple, and each view of an array,
+# is a counted reference, which costs more than the arithmetic here.
+
+
+@kernel
+def place_bodies(
+    bodies: FloatArray, frames: FloatArray, beam_mm: float, first: int, last: int, placed: FloatArray
+) -> None:
+    """Write the ends in the base of the bodies that move with the frames `first` to `last` into `placed`.
+
+    Args:
+        bodies: See `CollisionModel`.
+        frames: `(7, 3, 4)`, see `planner.arm.link_frames`.
+        beam_mm: The beam's length.
+        first: The first frame.
+        last: The last frame.
+        placed: Written: `(n_bodies, 6)`, x y z of the start, then of the end.
+    """
+    for body in range(len(bodies)):
+        f = int(bodies[body, _FRAME])
+        if not first <= f <= last:
+            continue
+        for row in range(3):
+            r0, r1, r2, origin = frames[f, row, 0], frames[f, row, 1], frames[f, row, 2], frames[f, row, 3]
+            start = r0 * bodies[body, _START] + r1 * bodies[body, _START + 1] + r2 * bodies[body, _START + 2]
+            end = r0 * bodies[body, _END] + r1 * bodies[body, _END + 1] + r2 * bodies[body, _END + 2]
+            if body == len(bodies) - 1:
+                end = start + beam_mm * (end - start)
+            placed[body, row] = start + origin
+            placed[body, 3 + row] = end + origin
+
+
+@kernel
+def nearest_pair(
+    pairs: IndexArray, bodies: FloatArray, obstacles: FloatArray,
+    field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
+    placed: FloatArray, obstacle_frames: FloatArray, angle: int, first: int, last: int, enough_mm: float,
+) -> tuple[float, int]:  # fmt: skip
+    """Return the least clearance in mm of the pairs `first` to `last` - 1 and the pair that has it.
+
+    Clearances of `enough_mm` or more are of no interest: if there is nothing below, that and -1 are returned.
+
+    Args:
+        pairs: See `CollisionModel`, as bodies, obstacles and the field's three.
+        bodies: ...
+        obstacles: ...
+        field_values: ...
+        field_origin: ...
+        field_spacing: ...
+        placed: `(n_bodies, 6)`, see `place_bodies`.
+        obstacle_frames: `(n_angles, n_obstacles, 3, 4)`, see `base_in_obstacles`.
+        angle: Which of the table angles.
+        first: The first pair to look at.
+        last: The pair after the last one.
+        enough_mm: The clearance from which on a pair is far enough apart.
+    """
+    beam = len(bodies) - 1
+    least, nearest = enough_mm, -1
+    for pair in range(first, last):
+        body, other = pairs[pair, 0], pairs[pair, 1]
+        radius = bodies[body, _RADIUS]
+        bound = min(least, 0.0) if body == beam else least
+        if other <= beam:
+            radius += bodies[other, _RADIUS]
+            distance = _body_distance(placed, body, other, bound + radius)
+        else:
+            i = other - beam - 1
+            ax, ay, az = _in_frame(obstacle_frames, angle, i, placed[body, 0], placed[body, 1], placed[body, 2])
+            bx, by, bz = _in_frame(obstacle_frames, angle, i, placed[body, 3], placed[body, 4], placed[body, 5])
+            kind = int(obstacles[i, 0])
+            if kind == FIELD:
+                distance = field_distance(
+                    field_values, field_origin, field_spacing, ax, ay, az, bx, by, bz, bound + radius
+                )
+            else:
+                distance = solid_distance(
+                    kind, obstacles[i, 1], obstacles[i, 2], obstacles[i, 3], ax, ay, az, bx, by, bz, bound + radius
+                )
+        # Not by the difference: it would take a distance that is only known to be enough for a smaller one.
+        if distance < bound + radius:
+            least, nearest = distance - radius, pair
+    return least, nearest
+
+
+@kernel
+def _body_distance(placed: FloatArray, a: int, b: int, enough_mm: float) -> float:
+    """Return the distance in mm of two placed segments; exact where it is below `enough_mm`."""
+    # Spheres around the segments may show that they are far enough apart. All lengths doubled: nothing needs halving.
+    between, length_a, length_b = 0.0, 0.0, 0.0
+    for row in range(3):
+        along_a, along_b = placed[a, 3 + row] - placed[a, row], placed[b, 3 + row] - placed[b, row]
+        gap = placed[a, row] + placed[a, 3 + row] - placed[b, row] - placed[b, 3 + row]
+        between += gap * gap
+        length_a += along_a * along_a
+        length_b += along_b * along_b
+    if sqrt(between) - sqrt(length_a) - sqrt(length_b) >= 2.0 * enough_mm:
+        return enough_mm
+    return segment_distance(
+        placed[a, 0], placed[a, 1], placed[a, 2], placed[a, 3], placed[a, 4], placed[a, 5],
+        placed[b, 0], placed[b, 1], placed[b, 2], placed[b, 3], placed[b, 4], placed[b, 5],
+    )  # fmt: skip
+
+
+@kernel
+def _in_frame(frames: FloatArray, angle: int, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    return (
+        frames[angle, i, 0, 0] * x + frames[angle, i, 0, 1] * y + frames[angle, i, 0, 2] * z + frames[angle, i, 0, 3],
+        frames[angle, i, 1, 0] * x + frames[angle, i, 1, 1] * y + frames[angle, i, 1, 2] * z + frames[angle, i, 1, 3],
+        frames[angle, i, 2, 0] * x + frames[angle, i, 2, 1] * y + frames[angle, i, 2, 2] * z + frames[angle, i, 2, 3],
+    )
+
+
+@kernel
+def _clearance_of_each(
+    arm: FloatArray, joints: FloatArray, beam_mm: float, pairs: IndexArray, bodies: FloatArray, obstacles: FloatArray,
+    field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
+    obstacle_frames: FloatArray, clearance_mm: FloatArray, pair: IndexArray,
+) -> None:  # fmt: skip
+    frames, placed = np.empty((7, 3, 4)), np.empty((len(bodies), 6))
+    for i in range(len(joints)):
+        link_frames(arm, joints[i], frames)
+        place_bodies(bodies, frames, beam_mm, 0, FLANGE_FRAME, placed)
+        clearance_mm[i], pair[i] = nearest_pair(
+            pairs, bodies, obstacles, field_values, field_origin, field_spacing,
+            placed, obstacle_frames, i, 0, len(pairs), np.inf,
+        )  # fmt: skip
