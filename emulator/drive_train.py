@@ -120,17 +120,22 @@ def _turning(train: DriveTrain, state: DriveState, voltage_V: float, load_torque
     speed, contact = state.speed_rad_s, state.contact
     direction = 1 if speed > 0.0 else -1
     rigid = train.half_gap_rad == 0.0
-    coupling = train.driving if rigid or direction == contact else train.overhauling
     table_torque = direction * train.bearing_friction_Nm + load_torque_Nm
     friction = direction * sliding_torque_Nm(train.friction, speed)
+    coupling = train.driving if rigid or direction == contact else train.overhauling
     current, next_speed, angle = _motor(
         coupling.motor, state, voltage_V, friction + coupling.torque_ratio * table_torque
     )
-    if not rigid:
-        accelerating_torque = train.table_inertia_s * (next_speed - speed)
-        if contact * (accelerating_torque + table_torque) < 0.0:
-            return _free(train, state, voltage_V, load_torque_Nm)
+    tooth_torque = train.table_inertia_s * (next_speed - speed) + table_torque
+    if rigid and direction * tooth_torque < 0.0:
+        coupling = train.overhauling
+        current, next_speed, angle = _motor(
+            coupling.motor, state, voltage_V, friction + coupling.torque_ratio * table_torque
+        )
+    elif contact * tooth_torque < 0.0 and not rigid:
+        return _free(train, state, voltage_V, load_torque_Nm)
     if next_speed * direction <= 0.0:
+        current = _standing_current(train, state.current_A, voltage_V)
         next_speed, angle = 0.0, _stopping_angle(state.angle_rad, speed, next_speed, train.tick_s)
     return _together(train, current, next_speed, angle, contact)
 
@@ -144,17 +149,15 @@ def _standing(train: DriveTrain, state: DriveState, voltage_V: float, load_torqu
     pulled = contact * load_torque_Nm < -train.bearing_friction_Nm
     if not rigid and (pulled or (contact * torque < 0.0 and not pressed)):
         return _free(train, state, voltage_V, load_torque_Nm)
-    coupling = train.driving if rigid or contact * torque >= 0.0 else train.overhauling
-    net = torque - coupling.torque_ratio * load_torque_Nm
-    holding = train.friction.static_Nm + coupling.torque_ratio * train.bearing_friction_Nm
-    if abs(net) <= holding:
-        return DriveState(current, 0.0, state.angle_rad, 0.0, state.table_angle_rad, contact)
-    direction = 1 if net > 0.0 else -1
-    resisting = direction * holding + coupling.torque_ratio * load_torque_Nm
-    current, speed, angle = _motor(coupling.motor, state, voltage_V, resisting)
-    if speed * direction <= 0.0:
-        return DriveState(current, 0.0, state.angle_rad, 0.0, state.table_angle_rad, contact)
-    return _together(train, current, speed, angle, contact)
+    for direction in (1, -1):
+        table_torque = direction * train.bearing_friction_Nm + load_torque_Nm
+        coupling = train.driving if direction * table_torque >= 0.0 else train.overhauling
+        resisting = direction * train.friction.static_Nm + coupling.torque_ratio * table_torque
+        if direction * (torque - resisting) > 0.0:
+            broken_away = _motor(coupling.motor, state, voltage_V, resisting)
+            if direction * broken_away[1] > 0.0:
+                return _together(train, broken_away[0], broken_away[1], broken_away[2], contact)
+    return DriveState(current, 0.0, state.angle_rad, 0.0, state.table_angle_rad, contact)
 
 
 def _free(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
@@ -169,7 +172,7 @@ def _free(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm
     closing = gap - gap_before
     share = (contact * train.half_gap_rad - gap_before) / closing if contact * closing > 0.0 else 0.0
     share = min(max(share, 0.0), 1.0)
-    inertia = (train.driving if contact * speed >= 0.0 else train.overhauling).inertia_kg_m2
+    inertia = (train.driving if contact * speed > 0.0 else train.overhauling).inertia_kg_m2
     momentum = train.motor_inertia_kg_m2 * speed + inertia * train.ratio * table_speed
     common_speed = momentum / (train.motor_inertia_kg_m2 + inertia)
     angle = state.angle_rad + share * (angle - state.angle_rad) + (1.0 - share) * train.tick_s * common_speed
@@ -189,6 +192,7 @@ def _free_motor(train: DriveTrain, state: DriveState, voltage_V: float) -> tuple
         resisting = direction * train.friction.static_Nm
     current, next_speed, angle = _motor(train.free, state, voltage_V, resisting)
     if next_speed * direction <= 0.0:
+        current = _standing_current(train, state.current_A, voltage_V)
         return current, 0.0, _stopping_angle(state.angle_rad, speed, next_speed, train.tick_s)
     return current, next_speed, angle
 
