@@ -4,7 +4,7 @@ import argparse
 import math
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -18,7 +18,7 @@ from emulator.tcp_port import TcpPort, parse_address
 
 _EXAMPLE = """example:
   python -m emulator --pty --link ./table &
-  python -m serial.tools.miniterm --eol CR ./table 9600      (or: picocom -b 9600 ./table)
+  picocom -b 9600 --echo --imap crcrlf ./table     (or: python -m serial.tools.miniterm --eol CR ./table 9600)
 
 The first line on stdout is the port that a client opens: the device, or a URL for pyserial. SIGUSR1 is the probe's
 trigger; Ctrl-C or SIGTERM end the stand-in with status 0.
@@ -50,6 +50,9 @@ def main(arguments: list[str] | None = None) -> int:
             _serve(options, config, stack)
     except (UsageError, ConfigError) as error:
         _say(str(error))
+        return 2
+    except OSError as error:
+        _say(f"cannot go on: {error}; see that there is room for the trace, and that stdout is read")
         return 2
     return 0
 
@@ -196,7 +199,8 @@ def _usage(option: str) -> Iterator[None]:
 
 
 def _say(sentence: str) -> None:
-    print(f"emulator: {sentence}", file=sys.stderr, flush=True)
+    with suppress(OSError):  # Nobody may be reading any more.
+        print(f"emulator: {sentence}", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -29,8 +29,9 @@ _LINE_BUFFER_BYTES = 256
 _LAST_FRACTION = 1.0 - 2.0**-20
 """The latest that an edge can be in a tick."""
 _TRIGGER_SIGNAL = "SIGUSR1"
-END_SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
-SERVED_SIGNALS = (*END_SIGNALS, _TRIGGER_SIGNAL)
+_END_SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+SERVED_SIGNALS = (*_END_SIGNALS, _TRIGGER_SIGNAL)
+"""What a `SignalWatch` for the server collects."""
 
 
 class Server:

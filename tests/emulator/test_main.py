@@ -331,6 +331,47 @@ def test_at_rest_it_uses_nearly_no_time(stand_in: Start) -> None:
     assert used_s() - before_s < 0.3
 
 
+def test_a_script_that_reads_one_line_and_no_more_does_not_stop_it() -> None:
+    command = [sys.executable, "-m", "emulator", "--pty"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    assert process.stdout is not None
+    name = process.stdout.readline().strip()
+    process.stdout.close()
+    with open_port(name, 4800) as port:  # a reason to speak to nobody
+        port.write(b"H\r")
+        port.baudrate = 9600
+        time.sleep(0.1)
+        assert ask(port, b"\rH").endswith(b"\r")
+    process.terminate()
+    assert process.wait(10) == 0
+
+
+def test_a_trace_for_which_there_is_no_room_is_said_and_leaves_no_half_file(tmp_path: Path) -> None:
+    (tmp_path / "run.csv.part").symlink_to("/dev/full")
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "emulator",
+            "--pty",
+            "--trace",
+            str(tmp_path / "run.csv"),
+            "--link",
+            str(tmp_path / "table"),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.terminate()
+    _, stderr = process.communicate(timeout=10)
+    assert process.returncode == 2
+    assert "No space left" in stderr.splitlines()[-1]
+    assert [path.name for path in tmp_path.iterdir()] == ["run.csv.part"]
+
+
 # Starts that must fail
 
 
