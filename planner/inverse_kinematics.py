@@ -3,8 +3,8 @@
 The wrist centre fixes joints 1 to 3, the flange's orientation then fixes joints 4 to 6. Two choices of joint 1
 (LEFTY faces the wrist, RIGHTY turns its back to it), two of the elbow and two of the wrist give the eight solutions.
 
-What configurations share is computed once, and sines and cosines come from the triangle's sides rather than from its
-angles: that makes the kernels a third faster.
+For speed, what configurations share is computed once, sines and cosines come from the triangle's sides rather than its
+angles, and `inverse` is one long function: a call passes every array anew, which costs a fifth.
 """
 
 import math
@@ -110,54 +110,6 @@ def _solve_wrist(  # noqa: PLR0917 - kernels take numbers and arrays, not object
 
 
 @kernel
-def _solve_elbows(  # noqa: PLR0917 - kernels take numbers and arrays, not objects
-    arm: FloatArray,
-    T_BF: FloatArray,
-    joint_1: float,
-    plane_x: float,
-    drop: float,
-    singular: bool,
-    joints: FloatArray,
-    reasons: CodeArray,
-    side: int,
-) -> None:
-    """Write the four solutions on one side, from slot `side` on (LEFTY 0, RIGHTY 4).
-
-    The wrist centre lies in the plane that joint 1 turns: `plane_x` from axis 1, and `drop` below joint 2.
-    """
-    a1, a2, a3, d4 = arm[0, A_MM], arm[1, A_MM], arm[2, A_MM], arm[3, D_MM]
-    ahead = plane_x - a1
-    span2 = ahead * ahead + drop * drop
-    forearm2 = a3 * a3 + d4 * d4
-    forearm = math.sqrt(forearm2)
-    cos_elbow = (span2 - a2 * a2 - forearm2) / (2.0 * a2 * forearm)
-    if not -1.0 <= cos_elbow <= 1.0:
-        _mark_out_of_reach(joints, reasons, side, side + 4)
-        return
-    along = a2 + forearm * cos_elbow
-    across = forearm * math.sqrt((1.0 - cos_elbow) * (1.0 + cos_elbow))
-    elbow, stretched = math.acos(cos_elbow), math.atan2(d4, a3)
-    to_wrist, off_wrist = math.atan2(drop, ahead), math.atan2(across, along)
-    c1, s1 = math.cos(joint_1), math.sin(joint_1)
-    # With all twists negated, joints 2, 3 and 5 turn the other way round and nothing else changes.
-    sense = -arm[0, SIN_ALPHA]
-    for below in range(2):
-        slot = side + 2 * below
-        # The forearm bends down from the upper arm for LEFTY ABOVE and RIGHTY BELOW.
-        bend = 1.0 if (side == 0) == (below == 0) else -1.0
-        forearm_ahead = ahead - a2 * (ahead * along + bend * drop * across) / span2
-        forearm_drop = drop - a2 * (drop * along - bend * ahead * across) / span2
-        c23 = (a3 * forearm_ahead - d4 * forearm_drop) / forearm2
-        s23 = (a3 * forearm_drop + d4 * forearm_ahead) / forearm2
-        joint_2 = _nearest_turn(arm, 1, sense * (to_wrist - bend * off_wrist))
-        joint_3 = _nearest_turn(arm, 2, sense * (bend * elbow + stretched))
-        aligned = _solve_wrist(arm, T_BF, c1, s1, c23, s23, joints, slot)
-        for solution in (slot, slot + 1):
-            joints[solution, 0], joints[solution, 1], joints[solution, 2] = joint_1, joint_2, joint_3
-            reasons[solution] = _SINGULAR if singular or aligned else _first_limit(arm, joints, solution)
-
-
-@kernel
 def _mark_out_of_reach(joints: FloatArray, reasons: CodeArray, first: int, last: int) -> None:
     for slot in range(first, last):
         reasons[slot] = _OUT_OF_REACH
@@ -175,22 +127,55 @@ def inverse(arm: FloatArray, T_BF: FloatArray, joints: FloatArray, reasons: Code
         joints: Written: `(8, 6)`, radians.
         reasons: Written: `(8,)`.
     """
-    d6 = arm[5, D_MM]
+    d1, d4, d6 = arm[0, D_MM], arm[3, D_MM], arm[5, D_MM]
+    a1, a2, a3 = arm[0, A_MM], arm[1, A_MM], arm[2, A_MM]
+    # With all twists negated, joints 2, 3 and 5 turn the other way round and nothing else changes.
+    sense = -arm[0, SIN_ALPHA]
+    # The wrist centre lies in the plane that joint 1 turns, which passes axis 1 at the distance `lateral`.
     x = T_BF[0, 3] - d6 * T_BF[0, 2]
     y = T_BF[1, 3] - d6 * T_BF[1, 2]
-    drop = arm[0, D_MM] - (T_BF[2, 3] - d6 * T_BF[2, 2])
-    lateral = -arm[0, SIN_ALPHA] * (arm[1, D_MM] + arm[2, D_MM])
+    drop = d1 - (T_BF[2, 3] - d6 * T_BF[2, 2])
+    lateral = sense * (arm[1, D_MM] + arm[2, D_MM])
     distance2 = x * x + y * y
-    plane_x2 = distance2 - lateral * lateral
-    if not plane_x2 >= 0.0:
+    in_plane2 = distance2 - lateral * lateral
+    if not in_plane2 >= 0.0:
         _mark_out_of_reach(joints, reasons, 0, 8)
         return
+    in_plane = math.sqrt(in_plane2)
     on_axis_1 = distance2 < _SINGULAR_DISTANCE2_MM2
-    azimuth = math.atan2(y, x)
-    for side in (0, 4):
-        plane_x = math.sqrt(plane_x2) if side == 0 else -math.sqrt(plane_x2)
-        joint_1 = _middle(arm, 0) if on_axis_1 else _nearest_turn(arm, 0, azimuth - math.atan2(lateral, plane_x))
-        _solve_elbows(arm, T_BF, joint_1, plane_x, drop, on_axis_1, joints, reasons, side)
+    azimuth, shoulder = math.atan2(y, x), math.atan2(lateral, in_plane)
+    forearm2 = a3 * a3 + d4 * d4
+    forearm, stretched = math.sqrt(forearm2), math.atan2(d4, a3)
+
+    for side in (0, 4):  # the first slot of LEFTY, and of RIGHTY
+        facing = azimuth - shoulder if side == 0 else azimuth + shoulder + math.pi
+        joint_1 = _middle(arm, 0) if on_axis_1 else _nearest_turn(arm, 0, facing)
+        c1, s1 = math.cos(joint_1), math.sin(joint_1)
+        # The triangle of upper arm, forearm and the span from joint 2 to the wrist centre, `ahead` of it and below.
+        ahead = (in_plane if side == 0 else -in_plane) - a1
+        span2 = ahead * ahead + drop * drop
+        cos_elbow = (span2 - a2 * a2 - forearm2) / (2.0 * a2 * forearm)
+        if not -1.0 <= cos_elbow <= 1.0:
+            _mark_out_of_reach(joints, reasons, side, side + 4)
+            continue
+        elbow, along = math.acos(cos_elbow), a2 + forearm * cos_elbow
+        across = forearm * math.sqrt((1.0 - cos_elbow) * (1.0 + cos_elbow))
+        to_wrist, off_wrist = math.atan2(drop, ahead), math.atan2(across, along)
+        singular = on_axis_1 or span2 < _SINGULAR_DISTANCE2_MM2
+        for below in (0, 2):
+            slot = side + below
+            # The forearm bends down from the upper arm for LEFTY ABOVE and RIGHTY BELOW.
+            bend = 1.0 if (side == 0) == (below == 0) else -1.0
+            joint_2 = _nearest_turn(arm, 1, sense * (to_wrist - bend * off_wrist))
+            joint_3 = _nearest_turn(arm, 2, sense * (bend * elbow + stretched))
+            forearm_ahead = ahead - a2 * (ahead * along + bend * drop * across) / span2
+            forearm_drop = drop - a2 * (drop * along - bend * ahead * across) / span2
+            c23 = (a3 * forearm_ahead - d4 * forearm_drop) / forearm2
+            s23 = (a3 * forearm_drop + d4 * forearm_ahead) / forearm2
+            aligned = _solve_wrist(arm, T_BF, c1, s1, c23, s23, joints, slot)
+            for solution in (slot, slot + 1):
+                joints[solution, 0], joints[solution, 1], joints[solution, 2] = joint_1, joint_2, joint_3
+                reasons[solution] = _SINGULAR if singular or aligned else _first_limit(arm, joints, solution)
 
 
 @kernel
