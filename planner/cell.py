@@ -26,7 +26,9 @@ class Table:
 
 @dataclass(frozen=True)
 class Probe:
-    """The laser probe as seen by the planner; range and line are those of facts any triangulation probe states.
+    """The laser probe as the planner sees it: one laser line, a measuring range, a housing.
+
+    The paper names no make; range and line are a typical short-range triangulation probe's, the housing an estimate.
 
     Attributes:
         stand_off_mm: Distance from the laser's exit to the surface, the middle of its range.

@@ -41,10 +41,11 @@ def load_mesh(file: Path) -> trimesh.Trimesh:
 
 def mesh_fault(mesh: trimesh.Trimesh) -> str | None:
     """Return why the mesh cannot be a workpiece, or None."""
-    return _size_fault(mesh) or _surface_fault(mesh)
+    return size_fault(mesh) or _surface_fault(mesh)
 
 
-def _size_fault(mesh: trimesh.Trimesh) -> str | None:
+def size_fault(mesh: trimesh.Trimesh) -> str | None:
+    """Return why the mesh is of no size that can be meant, or None."""
     if len(mesh.faces) == 0:
         return "the mesh is empty"
     if not np.isfinite(mesh.vertices).all():
@@ -52,7 +53,9 @@ def _size_fault(mesh: trimesh.Trimesh) -> str | None:
     largest_mm = float(np.max(mesh.extents))
     if not SMALLEST_MM <= largest_mm <= LARGEST_MM:
         hint = "; is it in metres?" if largest_mm < SMALLEST_MM else ""
-        return f"the mesh's longest side is {largest_mm:g} mm; allowed is {SMALLEST_MM:g} to {LARGEST_MM:g} mm{hint}"
+        return (
+            f"the workpiece's longest side is {largest_mm:g} mm; allowed is {SMALLEST_MM:g} to {LARGEST_MM:g} mm{hint}"
+        )
     return None
 
 
@@ -85,7 +88,7 @@ def first_crossing(mesh: trimesh.Trimesh) -> tuple[int, int] | None:
 
 
 def _segments_pierce(start: FloatArray, end: FloatArray, triangles: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return whether each open segment passes through the inside of its triangle (Moeller and Trumbore, 1997)."""
+    """Return whether each open segment passes through its closed triangle (Moeller and Trumbore, 1997)."""
     edge_1, edge_2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     direction = end - start
     p = np.cross(direction, edge_2)
@@ -97,6 +100,6 @@ def _segments_pierce(start: FloatArray, end: FloatArray, triangles: FloatArray) 
     u = np.sum(offset * p, axis=1) * scale
     v = np.sum(direction * q, axis=1) * scale
     t = np.sum(edge_2 * q, axis=1) * scale
-    inside = 1e-9
-    within = (u > inside) & (v > inside) & (u + v < 1.0 - inside) & (t > inside) & (t < 1.0 - inside)
+    rounding = 1e-9
+    within = (u > -rounding) & (v > -rounding) & (u + v < 1.0 + rounding) & (t > rounding) & (t < 1.0 - rounding)
     return np.asarray(crosses_plane & within)

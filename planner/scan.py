@@ -17,7 +17,7 @@ from planner.arrays import FloatArray
 from planner.bodies import Bodies, load_bodies
 from planner.cell import Cell, Probe, Table, placement
 from planner.errors import PlannerError, ScanFileError, WorkpieceError
-from planner.mesh import load_mesh, radius_about_axis_mm
+from planner.mesh import load_mesh, radius_about_axis_mm, size_fault
 from planner.patterns import PATTERNS, Coverage
 from planner.scan_path import ScanPath, at_scan_speed, load_scan_path
 from planner.toml_table import TomlTable
@@ -177,7 +177,11 @@ def _read_workpiece(section: TomlTable, folder: Path) -> tuple[Workpiece | None,
     names = [item.name for item in fields(shape) if item.name != "middle_mm"]
     workpiece = shape(middle_mm=(0.0, 0.0, 0.0), **{name: section.number(name, above=0.0) for name in names})
     section.finish()
-    return workpiece, workpiece.mesh(), None
+    mesh = workpiece.mesh()
+    fault = size_fault(mesh)
+    if fault is not None:
+        raise WorkpieceError(fault)
+    return workpiece, mesh, None
 
 
 def _check_it_fits_the_table(mesh: trimesh.Trimesh, cell: Cell) -> None:

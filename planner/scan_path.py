@@ -68,7 +68,8 @@ def at_scan_speed(
     """Return the path through `waypoints` `(n, 4, 4)` whose line moves over the surface at one speed.
 
     The speed is that of the fastest of the line's middle and ends, so that a turn on the spot takes its time too.
-    The last step is stretched or shrunk with all others, by less than half a step in all, to end at the last waypoint.
+    All steps are equal and the last one ends at the last waypoint: for that the speed gives way, by less than half a
+    step over the whole path.
     """
     line = 0.5 * line_width_mm
     marks = np.array([[-line, 0, stand_off_mm, 1], [0, 0, stand_off_mm, 1], [line, 0, stand_off_mm, 1]])

@@ -93,6 +93,10 @@ def test_separate_bodies_do_not_cross_and_overlapping_ones_do() -> None:
         assert (first_crossing(pair) is not None) == crosses
 
 
+def test_boxes_that_share_the_planes_of_their_sides_are_seen_to_cross() -> None:
+    assert first_crossing(both(box(), box(x_mm=60.0))) is not None
+
+
 def test_the_radius_is_measured_from_the_tables_axis_where_the_mesh_is_placed() -> None:
     assert radius_about_axis_mm(box(), placement(0.0, 0.0, 50.0, 45.0, 0.0, 0.0)) == pytest.approx(50.0 * np.sqrt(2.0))
     assert radius_about_axis_mm(box(), placement(30.0, 0.0, 50.0, 0.0, 0.0, 0.0)) == pytest.approx(np.hypot(80.0, 50.0))

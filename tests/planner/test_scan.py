@@ -82,6 +82,11 @@ def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
         ("table_speed_deg_s = 40", "table_speed_deg_s = 0", "limits.table_speed_deg_s is 0; it must be"),
         ("[limits]", "[limit]", "limit is not a known key; known are cell, limits, path, value, weights, workpiece"),
         ("[limits]", "[limits", "not a TOML file"),
+        (
+            "diameter_mm = 160",
+            "diameter_mm = 0.16",
+            "longest side is 0.16 mm; allowed is 10 to 1000 mm; is it in metres?",
+        ),
         ("diameter_mm = 160", "diameter_mm = 510", "reaches 255.0 mm from the table's axis"),
         ("[0, 0, 60, 0, 0, 0]", "[0, 0, -60, 0, 0, 0]", "reaches 60.0 mm below the table's top"),
         ("[cell]", "[cell.probe]\nstand_off_mm = 250\n[cell]", "cell.probe.stand_off_mm is 250; it must be"),
