@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import socket
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -173,6 +174,8 @@ def _open_pty(link_path: Path | None, baud: int, stack: ExitStack) -> Port:
 def _open_control(path: Path, stack: ExitStack) -> "ControlSocket":
     from emulator.control import ControlSocket  # noqa: PLC0415  # rarely asked for, and a start should be quick
 
+    if not hasattr(socket, "AF_UNIX"):
+        raise UsageError("--control: this system has no Unix sockets; start the table without it")
     with _usage(f"--control {path}"):
         control = ControlSocket(path)
     stack.callback(control.close)

@@ -195,6 +195,8 @@ class Serial(SerialBase):
     def _reconfigure_port(self) -> None:
         if self.bytesize != serial.EIGHTBITS or self.parity != serial.PARITY_NONE:
             raise SerialException(f"{self.port}: the table talks 8N1; open it with 8 data bits and no parity")
+        if not self.baudrate:
+            raise SerialException(f"{self.port}: a baud rate of 0 would hang up; give the table's own")
 
     def _require_open(self) -> None:
         if not self.is_open:

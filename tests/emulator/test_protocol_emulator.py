@@ -219,6 +219,11 @@ def test_anything_but_8n1_is_refused(setting: dict[str, Any]) -> None:
         open_port(**setting)
 
 
+def test_a_rate_of_nothing_is_refused() -> None:
+    with pytest.raises(serial.SerialException, match="baud rate of 0"):
+        open_port(baudrate=0)
+
+
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.binary(max_size=40), max_size=8))
 def test_any_bytes_leave_a_table_that_answers(pieces: list[bytes]) -> None:

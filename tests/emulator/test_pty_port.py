@@ -219,7 +219,8 @@ def test_parity_and_seven_bits_do_not_exist_on_a_pty(port: PtyPort) -> None:
 
 @pytest.mark.parametrize("flow_control", ["rtscts", "dsrdtr"])
 def test_a_port_opens_with_flow_control_but_has_no_modem_lines(port: PtyPort, flow_control: str) -> None:
-    with serial.serial_for_url(port.name, 9600, timeout=0, **{flow_control: True}) as client:
+    rtscts, dsrdtr = flow_control == "rtscts", flow_control == "dsrdtr"
+    with serial.Serial(port.name, 9600, timeout=0, rtscts=rtscts, dsrdtr=dsrdtr) as client:
         client.write(b"H\r")
         assert port.receive().data == b"H\r"
         with pytest.raises(OSError, match="Inappropriate ioctl"):
