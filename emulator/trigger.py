@@ -58,5 +58,6 @@ class TriggerInput:
         edges = self._single[:1]
         if self._rate_hz:
             offset = self._periods * self._tick_hz / self._rate_hz
-            edges.append((self._origin_tick + math.floor(offset), offset - math.floor(offset)))
+            if math.isfinite(offset):
+                edges.append((self._origin_tick + math.floor(offset), offset - math.floor(offset)))
         return edges

@@ -1,0 +1,59 @@
+import ctypes
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from emulator.config import load_config
+from emulator.drive_train import DriveState, at_standstill, drive_train, step
+from emulator.encoder import Encoder, angle_within_tick, count_at, encoder
+
+DEFAULT = load_config()
+COUNT_RAD = 384 / (2.0 * math.pi)
+FINE = 100  # steps a tick
+
+
+def test_the_default_table_gives_512_counts_a_degree() -> None:
+    motor_turns = 480 / 360
+    assert count_at(encoder(DEFAULT, phase=0.0), motor_turns * 2.0 * math.pi * (1.0 + 1e-9)) == 512
+
+
+@given(turns=st.integers(-1000, 1000), share=st.floats(0.01, 0.99), phase=st.floats(0.0, 1.0))
+def test_the_count_changes_where_an_edge_is_passed(turns: int, share: float, phase: float) -> None:
+    """Each count is one interval of the shaft, also below zero: a floor, not a truncation."""
+    angle = (384 * turns + share - phase) / COUNT_RAD
+    assert count_at(Encoder(COUNT_RAD, phase), angle) == 384 * turns
+
+
+@given(st.integers(-(2**40), 2**40))
+def test_the_counter_wraps_as_a_32_bit_register(counts: int) -> None:
+    assert count_at(Encoder(1.0, 0.5), float(counts)) == ctypes.c_int32(counts).value
+
+
+def smooth(before: DriveState, after: DriveState) -> bool:
+    """Tell whether a tick went without an impact, a separation or a stop."""
+    return before.contact == after.contact and before.speed_rad_s * after.speed_rad_s > 0.0
+
+
+@pytest.mark.parametrize("contact", [0, 1])
+@pytest.mark.parametrize("backlash_arcmin", [10.0, 600.0])
+def test_within_a_tick_the_angle_is_known_to_a_count_at_any_speed(contact: int, backlash_arcmin: float) -> None:
+    """Full voltage, reversed at full speed, with the table and without it, against steps a hundredth as long."""
+    config = replace(DEFAULT, gears=replace(DEFAULT.gears, backlash_arcmin=backlash_arcmin))
+    train = drive_train(config)
+    fine = drive_train(replace(config, control=replace(config.control, tick_hz=FINE * config.control.tick_hz)))
+    state = at_standstill(train, gap_share=-1.0)
+    state = state._replace(contact=contact, table_angle_rad=-contact * train.half_gap_rad)
+    worst = 0.0
+    for tick in range(150):
+        voltage_V = 12.0 if tick < 60 else -12.0
+        before, state = state, step(train, state, voltage_V, 0.0)
+        within = before
+        for part in range(1, FINE + 1):
+            within = step(fine, within, voltage_V, 0.0)
+            angle = angle_within_tick(before.angle_rad, state.angle_rad, before.speed_rad_s, train.tick_s, part / FINE)
+            if smooth(before, state):
+                worst = max(worst, abs(angle - within.angle_rad))
+    assert 0.0 < worst * COUNT_RAD < 1.0
