@@ -47,12 +47,15 @@ def column_value(values: FloatArray, epsilon: float, location: int, angle_deg: f
     position = angle_deg * count / 360.0
     below = sample_at_or_below(position)
     above = sample_at_or_above(position)
-    lower = float(values[location, below % count])
-    upper = float(values[location, above % count])
-    if lower <= epsilon or upper <= epsilon:
+    index = below % count
+    lower = float(values[location, index])
+    if lower <= epsilon:
         return 0.0
     if below >= above:
         return lower
+    upper = float(values[location, index + 1 if index + 1 < count else 0])
+    if upper <= epsilon:
+        return 0.0
     return lower + (position - below) * (upper - lower)
 
 

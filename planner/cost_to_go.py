@@ -56,7 +56,8 @@ class Grid(NamedTuple):
     @property
     def speeds_deg_s(self) -> FloatArray:
         """The (2 half_count + 1,) speeds of the grid, ascending."""
-        return np.arange(-self.half_count, self.half_count + 1) * self.speed_step_deg_s
+        top_deg_s = self.half_count * self.speed_step_deg_s
+        return np.linspace(-top_deg_s, top_deg_s, 2 * self.half_count + 1)
 
 
 class CostToGo(NamedTuple):

@@ -5,6 +5,7 @@ ends exactly on a node this is the true optimum; elsewhere the snapped motion is
 that is returned is its accelerations carried out with Eq. (3) and (4), which may drift into a forbidden region.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -75,7 +76,8 @@ def lattice_path(problem: Problem, cells: Cells) -> LatticePath | None:
     costs, targets, used, row_ends = _edges(problem.terms, cells, accelerations, _offset(problem))
     sources = _start_nodes(problem, cells)
     graph = _graph_with_source(costs, targets, row_ends, sources)
-    distances, predecessors = shortest_paths(graph, indices=graph.shape[0] - 1, return_predecessors=True)
+    source = [graph.shape[0] - 1]
+    (distances,), (predecessors,) = shortest_paths(graph, indices=source, return_predecessors=True)
     layer = cells.angle_count * cells.speed_count
     end = layer * problem.step_count + int(np.argmin(distances[layer * problem.step_count : -1]))
     if not np.isfinite(distances[end]):
@@ -84,13 +86,14 @@ def lattice_path(problem: Problem, cells: Cells) -> LatticePath | None:
     while nodes[-1] >= layer:
         nodes.append(int(predecessors[nodes[-1]]))
     path = np.array(nodes[::-1])
-    edges = [_edge(costs, targets, row_ends, a, b) for a, b in zip(path[:-1], path[1:], strict=True)]
+    edges = [_edge(costs, targets, row_ends, a, b) for a, b in pairwise(path)]
     speeds = (path % layer // cells.angle_count - cells.speed_count // 2) * _speed_step(problem, cells)
     wrapped_deg = (path % cells.angle_count) * (360.0 / cells.angle_count)
     chosen = accelerations[used[edges]]
-    moved = next_angle(0.0, speeds[:-1], chosen, problem.step_s)
-    turns = np.round((moved - np.diff(wrapped_deg)) / 360.0)
-    angles = wrapped_deg + 360.0 * np.concatenate(([0.0], np.cumsum(turns)))
+    angles = wrapped_deg.copy()
+    for k, acceleration in enumerate(chosen):
+        unsnapped_deg = next_angle(float(angles[k]), float(speeds[k]), float(acceleration), problem.step_s)
+        angles[k + 1] += 360.0 * round((unsnapped_deg - angles[k + 1]) / 360.0)
     return LatticePath(angles, speeds, chosen, float((costs[edges] - _offset(problem)).sum()))
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.arrays import FloatArray
-from planner.config_map import ConfigurationMap, column_value
+from planner.config_map import column_value
 from planner.cost import acceleration_cost, speed_cost, value_cost
 from planner.cost_to_go import CostToGo, Grid, cost_from, cost_to_go, default_grid, exact_grid
 from planner.crossing import step_is_allowed
@@ -71,8 +71,7 @@ def follow(problem: Problem, to_go: CostToGo) -> Plan | None:
 def _starts(problem: Problem, to_go: CostToGo, count: int = 3) -> list[tuple[float, float]]:
     """Return the start, or the `count` most promising ones where it is free."""
     if problem.start_angle_deg is None:
-        step_deg = problem.map.angle_step_deg / STARTS_PER_SAMPLE
-        angles = np.arange(problem.map.angle_count * STARTS_PER_SAMPLE) * step_deg
+        angles = np.linspace(0.0, 360.0, problem.map.angle_count * STARTS_PER_SAMPLE, endpoint=False)
     else:
         angles = np.array([problem.start_angle_deg], dtype=np.float64)
     free_speed = problem.start_speed_deg_s is None
@@ -174,11 +173,7 @@ def _first_unreachable_location(problem: Problem) -> int:
     reached, unreached = 0, problem.step_count
     while unreached - reached > 1:
         middle = (reached + unreached) // 2
-        beginning = replace(
-            problem.map,
-            values=problem.map.values[: middle + 1],
-            reasons=None,
-        )
+        beginning = replace(problem.map, values=problem.map.values[: middle + 1], reasons=None)
         part = replace(problem, map=beginning)
         if follow(part, cost_to_go(part, default_grid(part))) is None:
             unreached = middle

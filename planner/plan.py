@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.arrays import FloatArray
-from planner.config_map import column_value
+from planner.config_map import BoolArray, column_value
 from planner.cost import PathCost, acceleration_cost, speed_cost, value_cost
 from planner.kernel import kernel
 from planner.problem import Problem, Terms
@@ -86,15 +86,6 @@ class Plan:
 Outcome = Plan | NoPlan
 
 
-@kernel
-def values_along(terms: Terms, angles_deg: FloatArray) -> FloatArray:
-    """Return f_R at each location, 0 where it is forbidden."""
-    values = np.empty(len(angles_deg))
-    for k in range(len(angles_deg)):
-        values[k] = column_value(terms.values, terms.epsilon, k, angles_deg[k])
-    return values
-
-
 def path_cost(
     problem: Problem,
     angles_deg: FloatArray,
@@ -106,13 +97,22 @@ def path_cost(
     terms = problem.terms
     moving = np.ones(problem.step_count, dtype=np.bool_)
     moving[[pause.step for pause in pauses]] = False
-    values = values_along(terms, angles_deg)[1:]
     return PathCost(
-        acceleration=float(acceleration_cost(terms.acceleration_weight, accelerations_deg_s2)[moving].sum()),
-        speed=float(speed_cost(terms.speed_weight, speeds_deg_s[1:])[moving].sum()),
-        value=float(value_cost(values).sum()),
-        pauses=terms.pause_cost * len(pauses),
+        *_sum_costs(terms, moving, angles_deg, speeds_deg_s, accelerations_deg_s2), terms.pause_cost * len(pauses)
     )
+
+
+@kernel
+def _sum_costs(
+    terms: Terms, moving: BoolArray, angles_deg: FloatArray, speeds_deg_s: FloatArray, accelerations_deg_s2: FloatArray
+) -> tuple[float, float, float]:
+    acceleration, speed, value = 0.0, 0.0, 0.0
+    for k in range(len(accelerations_deg_s2)):
+        value += value_cost(column_value(terms.values, terms.epsilon, k + 1, angles_deg[k + 1]))
+        if moving[k]:
+            acceleration += acceleration_cost(terms.acceleration_weight, accelerations_deg_s2[k])
+            speed += speed_cost(terms.speed_weight, speeds_deg_s[k + 1])
+    return acceleration, speed, value
 
 
 def make_plan(

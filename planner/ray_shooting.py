@@ -24,7 +24,7 @@ GUIDED_NAME = "guided_ray_shooting"
 class Rays(NamedTuple):
     """n_a and p of the paper: how many rays, and how many columns each looks ahead (cut at the last column)."""
 
-    count: int = 21
+    rays: int = 21
     horizon: int = 30
 
 
@@ -63,7 +63,7 @@ def guided_ray_shooting(problem: Problem, rays: Rays | None = None) -> Outcome:
 
 
 def _shoot(problem: Problem, rays: Rays, name: str, terminal: Callable[[Problem], CostToGo]) -> Outcome:
-    accelerations = ray_accelerations(rays.count, problem.limits.acceleration_deg_s2)
+    accelerations = ray_accelerations(rays.rays, problem.limits.acceleration_deg_s2)
     if rays.horizon < 1:
         raise RayError(f"the horizon is {rays.horizon} columns; allowed is 1 or more")
     obstacle = obvious_obstacle(problem, name)
@@ -97,8 +97,9 @@ def _algorithm_2(
     angles, speeds = np.empty(steps + 1), np.empty(steps + 1)
     chosen, paused = np.zeros(steps), np.zeros(steps)
     angles[0], speeds[0] = angle_deg, speed_deg_s
+    best = 0
     for k in range(steps):
-        best = cheapest_ray(terms, accelerations, k, horizon, to_go, angles[k], speeds[k])
+        best = cheapest_ray(terms, accelerations, k, horizon, to_go, angles[k], speeds[k], best)
         a = limited_acceleration(speeds[k], accelerations[best], terms.step_s, terms.speed_limit_deg_s)
         if step_is_allowed(terms.runs, k, angles[k], speeds[k], a, terms.step_s):
             chosen[k] = a
@@ -120,13 +121,18 @@ def cheapest_ray(
     to_go: CostToGo,
     angle_deg: float,
     speed_deg_s: float,
+    likely: int = 0,
 ) -> int:
-    """Return the index of the ray from this state that costs least; the first of equal ones."""
+    """Return the index of the ray from this state that costs least; the first of equal ones.
+
+    The ray of index `likely` is followed first: when it is good, the others are soon seen to cost more.
+    """
     last = min(column + horizon, len(terms.values) - 1)
-    best, least = 0, np.inf
+    best = likely
+    least = ray_cost(terms, accelerations[best], column, last, to_go, angle_deg, speed_deg_s, np.inf)
     for i in range(len(accelerations)):
         cost = ray_cost(terms, accelerations[i], column, last, to_go, angle_deg, speed_deg_s, least)
-        if cost < least:
+        if cost < least or (cost == least and i < best):
             best, least = i, cost
     return best
 
@@ -145,7 +151,8 @@ def ray_cost(
     """Return what `evalpath` returns: the cost of a ray from column + 1 to `last`, both included.
 
     Once it leaves the allowed region, at a column or between two, each remaining step costs C_pen: those to `last`, or
-    to the end of the map where a cost-to-go accounts for them. The speed saturates at its limit. No term is negative, so a ray that already costs `bound` is not followed further.
+    to the end of the map where a cost-to-go accounts for them. The speed saturates at its limit. No term is negative,
+    so a ray that already costs more than `bound` is not followed further.
     """
     cost = 0.0
     for k in range(column, last):
@@ -158,7 +165,7 @@ def ray_cost(
         cost += acceleration_cost(terms.acceleration_weight, a)
         cost += speed_cost(terms.speed_weight, speed_deg_s)
         cost += value_cost(value)
-        if cost >= bound:
+        if cost > bound:
             return cost
     if len(to_go.costs) == 0:
         return cost

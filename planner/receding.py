@@ -193,8 +193,10 @@ def _best_angle_after_pause(online: OnlineStep, node_cost: CostArray, column: in
 @kernel
 def _costs_at_rest(online: OnlineStep, node_cost: CostArray, column: int) -> FloatArray:
     """Return, per angle, what it costs to be at rest there in the next column and to go on."""
-    to_go = online.layers[(column + 1) % 2, online.grid.half_count]
-    return (node_cost[column + 1] + to_go).astype(np.float64) * online.unit
+    costs: FloatArray = (node_cost[column + 1] + online.layers[(column + 1) % 2, online.grid.half_count]).astype(
+        np.float64
+    )
+    return costs * online.unit
 
 
 @kernel

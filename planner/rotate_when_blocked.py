@@ -41,16 +41,16 @@ def nearest_allowed_angle(terms: Terms, location: int, angle_deg: float) -> floa
     """
     if column_value(terms.values, terms.epsilon, location, angle_deg) > terms.epsilon:
         return angle_deg
-    count = terms.values.shape[1]
+    count: int = terms.values.shape[1]
     step_deg = 360.0 / count
     above, below = sample_at_or_above(angle_deg / step_deg), sample_at_or_below(angle_deg / step_deg)
     for _ in range(count):
         if above * step_deg - angle_deg <= angle_deg - below * step_deg + 1e-9:
             if terms.values[location, above % count] > terms.epsilon:
-                return above * step_deg
+                return float(above * step_deg)
             above += 1
         else:
             if terms.values[location, below % count] > terms.epsilon:
-                return below * step_deg
+                return float(below * step_deg)
             below -= 1
     return np.nan

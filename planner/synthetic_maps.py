@@ -63,6 +63,6 @@ def blocks_map(
         forbidden[first : last + 1, low : high + 1] = 1.0
     shade = forbidden.copy()
     for width in range(1, edge + 1):
-        ring = grey_dilation(forbidden, size=(2 * width + 1, 2 * width + 1), mode=("nearest", "wrap"))
+        ring = grey_dilation(forbidden, size=(2 * width + 1, 2 * width + 1), mode="nearest")
         shade = np.maximum(shade, ring * (1.0 - width / (edge + 1.0)))
     return ConfigurationMap(np.where(forbidden > 0.0, 0.0, 1.0 - 0.8 * shade))

@@ -1,5 +1,4 @@
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,13 +17,9 @@ OPEN = ConfigurationMap(np.ones((4, 8)))
     [("step", "time step"), ("speed", "speed limit"), ("acceleration", "acceleration limit")],
 )
 def test_a_step_or_limit_that_is_not_positive_is_refused_by_name(field: str, sentence: str, wrong: float) -> None:
-    arguments: dict[str, Any] = {
-        "step": {"step_s": wrong},
-        "speed": {"limits": Limits(speed_deg_s=wrong)},
-        "acceleration": {"limits": Limits(acceleration_deg_s2=wrong)},
-    }[field]
+    numbers = {"step": 0.1, "speed": 40.0, "acceleration": 100.0, field: wrong}
     with pytest.raises(ProblemError, match=sentence):
-        Problem(OPEN, **arguments)
+        Problem(OPEN, numbers["step"], Limits(numbers["speed"], numbers["acceleration"]))
 
 
 @pytest.mark.parametrize("wrong", [0.0, -1.0, math.nan, math.inf])

@@ -36,7 +36,8 @@ def open_problem(seed: int = 0, locations: int = 8) -> Problem:
 
 
 def test_a_ray_costs_equation_7_along_equation_4() -> None:
-    # As printed, omega is updated before theta: each step would gain a dt^2 / 2 too much, and - f_R would make it negative.
+    # As printed, omega is updated before theta: each step gains a dt^2 too much; and - f_R may
+    # make a cost negative.
     problem = open_problem()
     a = 60.0
     states = motion((33.0, -5.0), [a] * 7, problem.step_s)[1:]
@@ -177,7 +178,7 @@ def test_a_blocked_location_is_a_result(planner: type) -> None:
     assert isinstance(planner(Problem(ConfigurationMap(values))), NoPlan)
 
 
-@pytest.mark.parametrize("rays", [Rays(count=20), Rays(count=1), Rays(count=-3), Rays(horizon=0)])
+@pytest.mark.parametrize("rays", [Rays(rays=20), Rays(rays=1), Rays(rays=-3), Rays(horizon=0)])
 def test_a_set_of_rays_that_is_none_is_refused(rays: Rays) -> None:
     with pytest.raises(RayError, match="allowed"):
         ray_shooting(open_problem(), rays)

@@ -1,0 +1,202 @@
+"""Measure the planners: against the optimum of exact lattices, beside scipy's Dijkstra, and how they grow."""
+
+import ctypes
+import gc
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple, TextIO
+
+import numpy as np
+
+from planner.cost import Weights, default_weights
+from planner.cost_to_go import Grid, cost_to_go, exact_grid, lay_out_columns
+from planner.dijkstra import Cells, lattice_path
+from planner.dynamic_programming import dynamic_programming, follow
+from planner.motion import Limits
+from planner.plan import Plan
+from planner.planners import PLANNERS
+from planner.problem import Problem
+from planner.ray_shooting import Rays, ray_shooting
+from planner.receding import online_step, prepare_online_step, receding
+from planner.smoothing import smooth
+from planner.synthetic_maps import MapFamily, synthetic_map
+from planner.verification import verify
+
+MAPS_PER_FAMILY = 20
+
+COMPARED = {
+    **{name: PLANNERS[name] for name in ("dynamic_programming", "receding", "guided_ray_shooting", "ray_shooting")},
+    "ray_shooting+smoothing": lambda problem: _smoothed_rays(problem),
+}
+
+
+class Family(NamedTuple):
+    """A family of problems: maps, the time step and how many times the default weights."""
+
+    name: str
+    maps: MapFamily
+    step_s: float = 0.25
+    weight_factor: float = 1.0
+
+
+FAMILIES = (
+    Family("5 % forbidden", MapFamily(0.05, 6.0)),
+    Family("20 % forbidden", MapFamily(0.2, 6.0)),
+    Family("40 % forbidden", MapFamily(0.4, 6.0)),
+    Family("small obstacles", MapFamily(0.15, 2.0)),
+    Family("large obstacles", MapFamily(0.4, 10.0)),
+    Family("drifting pattern", MapFamily(0.4, 8.0, 1.0)),
+    Family("light weights", MapFamily(0.3, 5.0), weight_factor=0.1),
+    Family("heavy weights", MapFamily(0.3, 5.0), weight_factor=30.0),
+    Family("short steps", MapFamily(0.2, 6.0), step_s=0.1),
+    Family("long steps", MapFamily(0.3, 5.0), step_s=1.0),
+)
+
+
+class Tally(NamedTuple):
+    """What one planner did on one family."""
+
+    ratios: list[float]
+    touched: list[bool]
+    pauses: list[int]
+    seconds: list[float]
+
+
+def bench_planner(stream: TextIO) -> None:
+    """Print all measurements of the planners. Times are medians on this machine; compare those of one run."""
+    _bench_graph(stream)
+    _bench_steps(stream)
+    _bench_families(stream)
+    _bench_growth(stream)
+
+
+def median_seconds(function: Callable[[], object], repeats: int = 15) -> float:
+    """Return the median time of a call, after one that compiles."""
+    function()
+    times = []
+    for _ in range(repeats):
+        before = time.perf_counter()
+        function()
+        times.append(time.perf_counter() - before)
+    return float(np.median(times))
+
+
+def peak_memory_mb(function: Callable[[], object]) -> float:
+    """Return by how much a call raises this process's resident memory at its peak (Linux)."""
+    gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)
+    Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
+    before = _status_mb("VmRSS")
+    result = function()
+    peak = _status_mb("VmHWM")
+    del result
+    return max(peak - before, 0.0)
+
+
+def _status_mb(key: str) -> float:
+    lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    return next(float(line.split()[1]) / 1024.0 for line in lines if line.startswith(key))
+
+
+def _bench_graph(stream: TextIO) -> None:
+    problem = Problem(synthetic_map(MapFamily(0.2, 5.0), seed=1), limits=Limits(40.0, 80.0))
+    grid = Grid(100, 0.0, 0.8, 50, np.arange(-10, 11))
+    ours = partial(cost_to_go, problem, grid)
+    scipys = partial(lattice_path, problem, Cells(100, 101, 21))
+    seconds, megabytes = median_seconds(ours), peak_memory_mb(ours)
+    before = time.perf_counter()
+    scipy_megabytes = peak_memory_mb(scipys)
+    scipy_seconds = time.perf_counter() - before
+    print("\nThe paper's graph: 100 columns x 100 angles x 101 speeds, 21 accelerations", file=stream)
+    print(f"  cost-to-go, interpolated       {seconds * 1e3:8.2f} ms {megabytes:8.1f} MB", file=stream)
+    print(f"  scipy csgraph, graph and path  {scipy_seconds * 1e3:8.0f} ms {scipy_megabytes:8.0f} MB", file=stream)
+    print(f"  ratio                          {scipy_seconds / seconds:8.0f}", file=stream)
+
+
+def _bench_steps(stream: TextIO) -> None:
+    problem = Problem(synthetic_map(MapFamily(0.1, 6.0), seed=2), step_s=0.25)
+    online = prepare_online_step(problem)
+    columns = lay_out_columns(problem.terms, online.grid, online.unit)
+    step = partial(online_step, problem.terms, online, *columns, 0, 50, 0.0, 0.0)
+    rays = median_seconds(partial(ray_shooting, problem, Rays(21, 30)), 50) / problem.step_count
+    print("\nOne step", file=stream)
+    print(f"  ray shooting, 21 rays x 30 columns   {rays * 1e6:8.1f} us (a whole plan / its steps)", file=stream)
+    print(f"  receding, 50 columns in view         {median_seconds(step, 200) * 1e6:8.1f} us", file=stream)
+
+
+def _bench_families(stream: TextIO) -> None:
+    for family in FAMILIES:
+        tallies = {name: Tally([], [], [], []) for name in COMPARED}
+        crossable = sum(_tally(family, seed, tallies) for seed in range(MAPS_PER_FAMILY))
+        print(f"\n{family.name}: {crossable} of {MAPS_PER_FAMILY} maps have a way on the exact lattice", file=stream)
+        print("  planner                   ratio: mean    p95    max  touched  pauses  ms/plan us/step", file=stream)
+        for name, tally in tallies.items():
+            print(f"  {name:24}  {_row(tally)}", file=stream)
+
+
+def _row(tally: Tally) -> str:
+    ratios = np.array(tally.ratios) if tally.ratios else np.full(1, np.nan)
+    milliseconds = 1e3 * float(np.median(tally.seconds)) if tally.seconds else np.nan
+    return (
+        f"{ratios.mean():11.4f} {np.percentile(ratios, 95):6.3f} {ratios.max():6.3f} "
+        f"{100.0 * float(np.mean(tally.touched or [0])):6.0f} % {sum(tally.pauses):7d} "
+        f"{milliseconds:8.2f} {milliseconds * 10.0:7.1f}"
+    )
+
+
+def _tally(family: Family, seed: int, tallies: dict[str, Tally]) -> bool:
+    """Plan one map of a family by all planners from the optimum's start; tell whether the lattice has a way."""
+    limits = Limits()
+    weights = Weights(*(weight * family.weight_factor for weight in default_weights(limits)))
+    problem = Problem(synthetic_map(family.maps, seed), family.step_s, limits, weights)
+    optimum = lattice_optimum(problem)
+    if optimum is None:
+        return False
+    problem = replace(problem, start_angle_deg=float(optimum.angles_deg[0]))
+    for name, planner in COMPARED.items():
+        planner(problem)
+        before = time.perf_counter()
+        outcome = planner(problem)
+        tallies[name].seconds.append(time.perf_counter() - before)
+        if not isinstance(outcome, Plan):
+            tallies[name].touched.append(True)
+            continue
+        tallies[name].touched.append(bool(verify(problem, outcome).forbidden_steps))
+        tallies[name].pauses.append(len(outcome.pauses))
+        if not outcome.pauses:
+            tallies[name].ratios.append(outcome.cost.total / optimum.cost.total)
+    return True
+
+
+def lattice_optimum(problem: Problem) -> Plan | None:
+    """Return the optimum of a lattice on which every step ends exactly on a node, with at least 41 speeds."""
+    speed_step_deg_s = problem.limits.speed_deg_s / 20.0
+    refinement = int(np.ceil(2.0 * problem.map.angle_step_deg / problem.step_s / speed_step_deg_s))
+    return follow(problem, cost_to_go(problem, exact_grid(problem, refinement, jump_count=1001)))
+
+
+def _smoothed_rays(problem: Problem) -> Plan:
+    plan = ray_shooting(problem)
+    assert isinstance(plan, Plan)
+    return smooth(problem, plan)
+
+
+def _bench_growth(stream: TextIO) -> None:
+    print("\nGrowth of the whole plan (dynamic programming; receding)", file=stream)
+    for columns, angles in ((100, 100), (200, 100), (400, 100), (100, 200), (100, 400), (1000, 100)):
+        family = MapFamily(0.1, 6.0, location_count=columns, angle_count=angles)
+        problem = Problem(synthetic_map(family, 3), step_s=0.25)
+        whole = median_seconds(partial(dynamic_programming, problem), 3)
+        online = median_seconds(partial(receding, problem), 3)
+        print(
+            f"  {columns:5d} columns x {angles:4d} angles  {whole * 1e3:9.2f} ms {online * 1e3:9.2f} ms", file=stream
+        )
+    problem = Problem(synthetic_map(MapFamily(0.1, 6.0), 3), limits=Limits(40.0, 80.0))
+    print("Growth of the cost-to-go of 100 x 100 with the speeds, 21 accelerations", file=stream)
+    for half in (25, 50, 100, 200):
+        grid = Grid(100, 0.0, 40.0 / half, half, np.arange(-10, 11))
+        seconds = median_seconds(partial(cost_to_go, problem, grid), 5)
+        print(f"  {2 * half + 1:5d} speeds {seconds * 1e3:9.2f} ms", file=stream)
