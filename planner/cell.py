@@ -50,7 +50,7 @@ def placement(*x_y_z_yaw_pitch_roll: float) -> FloatArray:
     return np.asarray(from_xyz_yaw_pitch_roll(np.array([x_y_z_yaw_pitch_roll]))[0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cell:
     """Arm, table and probe with their placements. The default figures are estimates of a cell like the paper's.
 

@@ -50,7 +50,7 @@ class CostWeights:
     k_w: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scan:
     """Everything that a configuration map and a plan need.
 

@@ -13,7 +13,7 @@ from planner.errors import PathError
 from planner.transforms import first_not_rigid, from_xyz_yaw_pitch_roll, nearest_rigid
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ScanPath:
     """Scan locations and the time between two of them.
 
