@@ -10,6 +10,7 @@ from emulator.config import TableConfig
 from emulator.drive_train import DriveState, at_standstill
 from emulator.encoder import angle_within_tick, count_at
 from emulator.firmware import IDLE, STALLED, power_on
+from emulator.fixed_point import wrap_int32
 from emulator.interpreter import Interpreter, Registers
 from emulator.profiler import Profile
 from emulator.status import TableStatus, table_status
@@ -129,14 +130,14 @@ class Table:
         self._load_torque_Nm = torque_Nm
         self._resting = False
 
-    def reset(self) -> None:
-        """Switch the table off and on: the controller wakes at 0 degrees where the plant is; the plant goes on."""
+    def reset(self, count: int = 0) -> None:
+        """Switch the table off and on: the controller wakes at `count` where the plant is; the plant goes on."""
         drive, encoder = self._state.drive, self._constants.encoder
-        counted = math.floor(drive.angle_rad * encoder.count_rad + encoder.phase)
+        counted = math.floor(drive.angle_rad * encoder.count_rad + encoder.phase) - count
         self._constants = self._constants._replace(encoder=encoder._replace(phase=encoder.phase - counted))
-        self._true_zero_rad = drive.angle_rad * self._constants.drive.table_per_motor
+        self._true_zero_rad = (drive.angle_rad - count / encoder.count_rad) * self._constants.drive.table_per_motor
         self.disconnect()
-        self._registers = self._interpreter.power_on()
+        self._registers = self._interpreter.power_on()._replace(latched_count=wrap_int32(count))
         self._state = self._woken(drive)
         self._resting = False
 

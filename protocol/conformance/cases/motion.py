@@ -1,0 +1,185 @@
+"""Chapters 7.1 and 7.2: a motion from rest, and its end."""
+
+from collections.abc import Sequence
+from math import sqrt
+
+from protocol.conformance.case import case
+from protocol.conformance.rig import Expectation, Rig, Sample, require
+from protocol.conformance.verdict import NonconformityError
+
+
+@case("7.1/1", travel_deg=30)
+def a_long_motion_is_a_trapezoid(rig: Rig) -> None:
+    """Measure top speed, acceleration and deceleration of a motion long enough to reach S."""
+    _travel(rig, 30, rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 4)
+    _measure_trapezoid(rig)
+
+
+@case("7.1/1:backwards", travel_deg=30)
+def a_long_motion_backwards_is_a_trapezoid(rig: Rig) -> None:
+    """The same backwards, with other S and A."""
+    _travel(rig, -30, rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2)
+    _measure_trapezoid(rig)
+
+
+@case("7.1/2", travel_deg=10)
+def a_short_motion_is_a_triangle(rig: Rig) -> None:
+    """Move by less than S^2/A: half the way up, half the way down."""
+    rate = rig.profile.motion.acceleration_deg_s2 / 5
+    _travel(rig, 0.5 * min(10.0, rig.profile.motion.speed_deg_s**2 / rate), rig.profile.motion.speed_deg_s, rate)
+
+
+@case("7.1/3", travel_deg=30)
+def a_motion_takes_its_time(rig: Rig) -> None:
+    """Compare the pace of a long motion with the trapezoid's."""
+    _travel(rig, 30, rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
+    _measure_duration(rig)
+
+
+@case("7.1/3:triangle", travel_deg=10)
+def a_short_motion_takes_its_time(rig: Rig) -> None:
+    """The same for a motion too short to reach S."""
+    _travel(rig, 10, rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2 / 5)
+    _measure_duration(rig)
+
+
+@case("7.1/4", travel_deg=20)
+def a_motion_does_not_pass_its_target(rig: Rig) -> None:
+    """Move as fast as allowed, and look for the farthest position on the way."""
+    _travel(rig, 20, rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2)
+    farthest = max(sample.position_deg for sample in rig.motion.samples) - rig.home_deg - 20
+    allowed = rig.profile.tolerance.tracking_deg + rig.profile.resolution_deg / 2
+    rig.measure("farthest position, from the target", farthest, "deg", most=allowed)
+
+
+@case("7.1/5", travel_deg=20)
+def the_speed_stays_within_s(rig: Rig) -> None:
+    """Measure the highest speed over tenths of a second of a motion."""
+    top = rig.profile.motion.speed_deg_s / 2
+    _travel(rig, 20, top, rig.profile.motion.acceleration_deg_s2)
+    window_s = 0.1
+    speeds = [
+        (later.position_deg - one.position_deg) / (later.time_s - one.time_s)
+        for index, one in enumerate(rig.motion.samples)
+        for later in rig.motion.samples[index + 1 :]
+        if window_s <= later.time_s - one.time_s <= 2 * window_s
+    ]
+    jitter = (rig.profile.resolution_deg + top * rig.profile.serial.latency_s / 2) / window_s
+    excess = max(speeds, default=0.0) - top
+    rig.measure("highest speed, above S", excess, "deg/s", most=top * rig.profile.tolerance.speed_share + jitter)
+
+
+@case("7.2/1", travel_deg=5)
+def the_table_holds_its_target(rig: Rig) -> None:
+    """After a motion, watch the position for half a second."""
+    rig.move_to(5)
+    rig.finish()
+    readings = []
+    for _ in range(10):
+        readings.append(rig.read())
+        rig.wire.clock.sleep_s(0.05)
+    require(len(set(readings)) == 1, f"at rest the table was read at {min(readings)} to {max(readings)} deg")
+
+
+@case("7.2/2", travel_deg=20)
+def the_table_comes_to_rest_at_its_target(rig: Rig) -> None:
+    """Approach targets from both sides, short and long ways."""
+    rig.settings(rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2)
+    for target in (20, 19.9, 0.2, 0.25, -0.05, 0):
+        rig.move_to(target)
+        rig.finish(f"at {target:g}")
+
+
+@case("7.2/3", travel_deg=20)
+def the_table_settles_soon(rig: Rig) -> None:
+    """Measure the time from the end of the profile until the table stays at its target."""
+    rig.settings(rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2)
+    rig.move_to(20)
+    rig.follow()
+    target, settling_s = rig.home_deg + 20, rig.profile.tolerance.settling_s
+    rig.follow(1.2 * settling_s)
+    expected = rig.motion.expectations[-1]
+    allowed = rig.profile.tolerance.rest_deg + rig.profile.resolution_deg / 2
+    away = [sample.time_s for sample in rig.motion.samples if abs(sample.position_deg - target) > allowed]
+    over_s = max(away) - expected.began_s - expected.motion.duration_s
+    rig.measure("settling", max(over_s, 0.0), "s", most=settling_s)
+
+
+@case("7.2/4", travel_deg=10)
+def errors_do_not_add_up(rig: Rig) -> None:
+    """Go to and fro five times; each end is where the first was."""
+    rig.settings(rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2)
+    for _ in range(5):
+        for target in (5, 0):
+            rig.move_to(target)
+            rig.follow()
+            rig.wait_for_rest()
+    rig.finish("after ten motions")
+
+
+def _travel(rig: Rig, distance_deg: float, top_deg_s: float, rate_deg_s2: float) -> None:
+    rig.settings(top_deg_s, rate_deg_s2)
+    rig.move_to(distance_deg)
+    rig.finish()
+
+
+def _measure_trapezoid(rig: Rig) -> None:
+    """Measure acceleration, top speed and deceleration, each by a line through what must be one."""
+    motion = rig.motion.expectations[-1].motion
+    up, cruise, down = motion.phases
+    top, rate = rig.top_deg_s, rig.rate_deg_s2
+    speed_share = rig.profile.tolerance.speed_share
+    top_measured = abs(_slope(_within(rig, up.duration_s + 0.1, up.duration_s + cruise.duration_s - 0.05)))
+    rig.measure("top speed", top_measured, "deg/s", top * (1 - speed_share), top * (1 + speed_share))
+    share = rig.profile.tolerance.acceleration_share
+    for name, origin_deg, begin_s, end_s in (
+        ("acceleration", motion.start_deg, 0.1 * up.duration_s, up.duration_s),
+        ("deceleration", motion.target_deg, motion.duration_s - down.duration_s, motion.duration_s - 0.1 * down.duration_s),
+    ):
+        # Where the acceleration is constant from or to rest, sqrt(2 x) is a line of slope sqrt(A).
+        roots = [
+            sample._replace(position_deg=sqrt(2 * abs(sample.position_deg - origin_deg)))
+            for sample in _within(rig, begin_s, end_s)
+        ]
+        rig.measure(name, _slope(roots) ** 2, "deg/s2", rate * (1 - share), rate * (1 + share))
+
+
+def _measure_duration(rig: Rig) -> None:
+    """Measure the motion's duration as its pace: a line through the time of each position in the trapezoid and here."""
+    expected = rig.motion.expectations[-1]
+    duration_s = expected.motion.duration_s
+    pairs = [
+        Sample(_time_of(expected, sample.position_deg), sample.time_s, 0.0)
+        for sample in _within(rig, 0.1 * duration_s, 0.9 * duration_s)
+    ]
+    tolerance = rig.profile.tolerance
+    allowed_s = max(tolerance.duration_share * duration_s, tolerance.duration_s)
+    rig.measure("duration", _slope(pairs) * duration_s, "s", duration_s - allowed_s, duration_s + allowed_s)
+
+
+def _time_of(expected: Expectation, position_deg: float) -> float:
+    """Return when the reference of a motion from rest is at a position, by bisection."""
+    low_s, high_s = 0.0, expected.motion.duration_s
+    forwards = expected.motion.target_deg > expected.motion.start_deg
+    for _ in range(40):
+        middle_s = (low_s + high_s) / 2
+        if (expected.motion.at(middle_s)[0] < position_deg) == forwards:
+            low_s = middle_s
+        else:
+            high_s = middle_s
+    return low_s
+
+
+def _within(rig: Rig, begin_s: float, end_s: float) -> list[Sample]:
+    """Return what was read in a time since the last command."""
+    began_s = rig.motion.expectations[-1].began_s
+    return [sample for sample in rig.motion.samples if begin_s <= sample.time_s - began_s <= end_s]
+
+
+def _slope(samples: Sequence[Sample]) -> float:
+    """Return the slope of the line of least squares."""
+    if len(samples) < 4:
+        raise NonconformityError(f"only {len(samples)} positions could be read where at least 4 are needed")
+    mean_s = sum(sample.time_s for sample in samples) / len(samples)
+    spread = sum((sample.time_s - mean_s) ** 2 for sample in samples)
+    return sum((sample.time_s - mean_s) * sample.position_deg for sample in samples) / spread

@@ -1,0 +1,60 @@
+"""Chapter 8: what a client relies on to find its place again."""
+
+from protocol.client import TableClient
+from protocol.conformance.case import case
+from protocol.conformance.rig import Rig, require
+from protocol.conformance.stand import ERROR_REPLIES
+from protocol.messages import ErrorCode
+
+
+@case("8.1/1")
+def a_client_may_have_64_bytes_unanswered(rig: Rig) -> None:
+    """Send 64 bytes of `H` and `L` in turn; each has its reply, in order."""
+    rig.wire.send(b"H\rL\r" * 16)
+    for letter in (b"H", b"L") * 16:
+        rig.angle_in(rig.reply_to(letter), letter)
+
+
+@case("8.3/1", ERROR_REPLIES)
+def cancel_ends_a_half_line(rig: Rig) -> None:
+    """Leave half a motion command, send CAN and CR, and ask: the half line is not carried out."""
+    with rig.unmoved(b"R 5 and CAN"):
+        rig.wire.send(b"R 5")
+        rig.refused(b"\x18", ErrorCode.BAD_BYTE)
+
+
+@case("8.3/2")
+def late_replies_are_told_apart(rig: Rig) -> None:
+    """Leave five replies unread, and let the client find its place by the rules of 8.3."""
+    rig.wire.send(b"H\rL\rH\rS 1\rH\r")
+    _client_agrees(rig)
+
+
+@case("8.3/3", ERROR_REPLIES)
+def a_client_finds_its_place_after_noise(rig: Rig) -> None:
+    """Send noise without CAN or CR, and let the client find its place by the rules of 8.3."""
+    rig.wire.send(bytes(rig.chance.randrange(0x80, 0x100) for _ in range(20)))
+    _client_agrees(rig)
+
+
+@case("8.3/4", travel_deg=20)
+def a_stop_is_heard_at_once(rig: Rig) -> None:
+    """During a motion leave replies unread and send CAN, CR and `R 0`: the table stops, and comes back."""
+    rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
+    rig.move_to(20)
+    rig.follow(0.5)
+    rig.wire.send(b"H\rH\rH")
+    rig.wire.send(b"\x18\rR 0\r")
+    rig.wire.listen(0.1)
+    stopped = float(rig.wait_for_rest()) - rig.home_deg
+    rig.measure("where R 0 brought it to rest", stopped, "deg", most=15)
+
+
+def _client_agrees(rig: Rig) -> None:
+    """Require that a client, as anybody would use it, reads the same position as this suite."""
+    client = TableClient(rig.wire.port, rig.profile.serial.timeout_s)
+    position = client.position_deg()
+    rig.wire.listen(0.1)
+    require(position == float(rig.read()), f"the client read {position}, the suite {rig.read()}")
+
+

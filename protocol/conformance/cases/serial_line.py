@@ -1,0 +1,99 @@
+"""Chapter 2: the serial line."""
+
+from protocol.conformance.case import case
+from protocol.conformance.rig import QUIET_S, Rig, require
+from protocol.conformance.stand import ERROR_REPLIES, PACING
+from protocol.messages import ErrorCode
+
+_TRAIN = 8
+"""Commands sent at once, so that their replies follow one another."""
+
+
+@case("2.1/1", PACING)
+def bytes_take_ten_bits(rig: Rig) -> None:
+    """Send several `H` at once; the replies come no faster than 10 bit times a byte allow."""
+    rig.wire.send(b"H\r" * _TRAIN)
+    replies = [rig.reply_to(b"H") for _ in range(_TRAIN)]
+    count = sum(len(reply.text) + 1 for reply in replies) - 1
+    duration_s = replies[-1].last_s - replies[0].first_s
+    slack = rig.profile.serial.latency_s / (count * rig.profile.byte_s)
+    bits = 10 * duration_s / (count * rig.profile.byte_s)
+    rig.measure("bit times a byte", bits, "bits", least=9.5 * (1 - slack))
+
+
+@case("2.1/2")
+def the_rate_is_as_agreed(rig: Rig) -> None:
+    """Read the position at the profile's rate."""
+    rig.read()
+
+
+@case("2.1/3")
+def there_is_no_flow_control(rig: Rig) -> None:
+    """Send XOFF: it is a bad byte, and the next `H` is answered all the same."""
+    rig.refused(b"\x13", ErrorCode.BAD_BYTE)
+    rig.read()
+
+
+@case("2.2/1")
+def a_reply_begins_soon(rig: Rig) -> None:
+    """Measure, over 20 reads, the time from the end of the command to the first byte of the reply."""
+    delays_s = []
+    for _ in range(20):
+        sent_s = rig.wire.send(b"H\r")
+        delays_s.append(rig.reply_to(b"H").first_s - sent_s - 3 * rig.profile.byte_s)
+    allowed_s = 0.010 + rig.profile.serial.latency_s
+    rig.measure("longest wait for a reply", 1000 * max(delays_s), "ms", most=1000 * allowed_s)
+
+
+@case("2.2/2", travel_deg=20)
+def a_reply_does_not_wait_for_a_motion(rig: Rig) -> None:
+    """Command a motion; `OK` and the position come while it runs."""
+    rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
+    sent_s = rig.wire.clock.now_s()
+    rig.move_to(20)
+    rig.sample()
+    waited_s = rig.wire.clock.now_s() - sent_s
+    duration_s = rig.motion.expectations[-1].motion.duration_s
+    rig.measure("two replies during a motion", waited_s, "s", most=duration_s / 2)
+    rig.finish()
+
+
+@case("2.2/3")
+def the_bytes_of_a_reply_come_without_gaps(rig: Rig) -> None:
+    """Measure, over 20 reads, the longest time between two bytes of a reply."""
+    gap_s = max(rig.ask(b"H").gap_s for _ in range(20))
+    rig.measure("longest gap in a reply", 1000 * gap_s, "ms", most=1000 * (0.010 + rig.profile.serial.latency_s))
+
+
+@case("2.3/1")
+def the_buffer_holds_what_it_promises(rig: Rig) -> None:
+    """Send a buffer full of `H` at once; each is answered."""
+    count = rig.profile.serial.buffer_bytes // 2
+    rig.wire.send(b"H\r" * count)
+    for _ in range(count):
+        rig.angle_in(rig.reply_to(b"H"))
+    rig.silence("after the last of them the line")
+
+
+@case("2.3/2", ERROR_REPLIES)
+def a_line_that_lost_bytes_is_a_bad_byte(rig: Rig) -> None:
+    """Send five times the buffer at once: each reply is a position, or tells of a bad byte."""
+    count = 5 * rig.profile.serial.buffer_bytes // 2
+    rig.wire.send(b"H\r" * count)
+    heard = rig.wire.listen(count * 8 * rig.profile.byte_s + 0.2).split(b"\r")
+    require(heard.pop() == b"", "the last reply has no CR")
+    strange = [line for line in heard if not line.startswith((b"H ", b"ERR 5 "))]
+    require(not strange, f"lines that lost bytes were read as others: {strange[:3]}")
+    require(len(heard) <= count, f"{count} lines got {len(heard)} replies")
+
+
+@case("2.3/3", ERROR_REPLIES)
+def lines_after_a_flood_are_read(rig: Rig) -> None:
+    """Send five times the buffer at once, wait, end what may be a torn line; the next lines are answered as ever."""
+    count = 5 * rig.profile.serial.buffer_bytes // 2
+    rig.wire.send(b"H\r" * count)
+    rig.wire.listen(count * 8 * rig.profile.byte_s + 0.2)
+    rig.wire.send(b"\r")
+    rig.wire.listen(QUIET_S)
+    rig.read(b"H")
+    rig.read(b"L")

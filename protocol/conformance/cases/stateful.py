@@ -1,0 +1,10 @@
+"""Random walks through the protocol."""
+
+from protocol.conformance.case import case
+from protocol.conformance.rig import Rig
+from protocol.conformance.stand import RANDOM_SEARCH
+
+
+@case("4.1/11:random", RANDOM_SEARCH, travel_deg=20)
+def any_sequence_of_commands_is_answered(rig: Rig) -> None:
+    """Draw sequences of commands, waits, triggers and readings; a model of the registers predicts each answer."""

@@ -1,0 +1,224 @@
+"""The profile: what is known of the table under test, and how far and fast it may be moved."""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from protocol.conformance.clauses import specification
+
+DEFAULT_FILE = Path(__file__).with_name("default.toml")
+
+
+class ProfileError(ValueError):
+    """A profile that cannot be used; the message names the file, the key and what is allowed."""
+
+
+@dataclass(frozen=True)
+class TableProfile:
+    """Which table it is."""
+
+    name: str
+    counts_per_deg: float
+
+
+@dataclass(frozen=True)
+class SerialProfile:
+    """The line, and the times on it."""
+
+    baud: int
+    decimals: int
+    error_replies: bool
+    buffer_bytes: int
+    latency_s: float
+    timeout_s: float
+
+
+@dataclass(frozen=True)
+class MotionValues:
+    """A speed and an acceleration."""
+
+    speed_deg_s: float
+    acceleration_deg_s2: float
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How exact the table must be."""
+
+    rest_deg: float
+    tracking_deg: float
+    duration_share: float
+    duration_s: float
+    speed_share: float
+    acceleration_share: float
+    settling_s: float
+
+
+@dataclass(frozen=True)
+class MotionAllowed:
+    """How far, each way from its first position, and how fast the table may be moved."""
+
+    reach_deg: float
+    speed_deg_s: float
+    acceleration_deg_s2: float
+
+
+@dataclass(frozen=True)
+class RigProfile:
+    """What the rig can do beyond the wire."""
+
+    sees_disconnect: bool
+    trigger_command: tuple[str, ...]
+    power_cycle_command: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Everything that the suite takes for granted about the table under test."""
+
+    table: TableProfile
+    serial: SerialProfile
+    limits: MotionValues
+    power_on: MotionValues
+    tolerance: Tolerance
+    motion: MotionAllowed
+    rig: RigProfile
+    waive: Mapping[str, str]
+
+    @property
+    def resolution_deg(self) -> float:
+        """The unit of the last decimal in a reply."""
+        return float(10.0**-self.serial.decimals)
+
+    @property
+    def range_deg(self) -> float:
+        """The positions that a register holds: from minus this up to this, without it."""
+        return 2.0**31 / self.table.counts_per_deg
+
+    @property
+    def byte_s(self) -> float:
+        """The time that a byte takes on the line."""
+        return 10.0 / self.serial.baud if self.serial.baud else 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the profile as plain values, for a record."""
+        return asdict(self)
+
+
+def load_profile(path: Path | None = None) -> Profile:
+    """Read a profile: the default table's, with the keys of the file at `path` over them.
+
+    Raises:
+        ProfileError: the file cannot be read, a key, a type or a value is wrong, or two values contradict each other.
+    """
+    values = _read(DEFAULT_FILE)
+    source = DEFAULT_FILE.name
+    if path is not None:
+        values, source = _merged(values, _read(path), str(path)), str(path)
+    return profile_from(values, source)
+
+
+def profile_from(values: Mapping[str, Any], source: str) -> Profile:
+    """Return the profile that plain values, complete, describe; see `load_profile`."""
+    profile = Profile(
+        _section(TableProfile, values, "table", source),
+        _section(SerialProfile, values, "serial", source),
+        _section(MotionValues, values, "limits", source),
+        _section(MotionValues, values, "power_on", source),
+        _section(Tolerance, values, "tolerance", source),
+        _section(MotionAllowed, values, "motion", source),
+        _section(RigProfile, values, "rig", source),
+        dict(values["waive"]),
+    )
+    _check_together(profile, source)
+    return profile
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ProfileError(f"{path}: cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ProfileError(f"{path}: is not TOML: {error}") from error
+
+
+def _merged(defaults: dict[str, Any], changes: Mapping[str, Any], source: str) -> dict[str, Any]:
+    merged = dict(defaults)
+    for section, keys in changes.items():
+        if section not in defaults:
+            raise ProfileError(f"{source}: [{section}] is no section; there are {', '.join(defaults)}")
+        if not isinstance(keys, dict):
+            raise ProfileError(f"{source}: {section} must be a section, not {keys!r}")
+        unknown = [key for key in keys if section != "waive" and key not in defaults[section]]
+        if unknown:
+            raise ProfileError(
+                f"{source}: {section}.{unknown[0]} is not a key; allowed are {', '.join(defaults[section])}"
+            )
+        merged[section] = defaults[section] | keys
+    return merged
+
+
+_Section = TypeVar("_Section")
+
+
+def _section(kind: type[_Section], values: Mapping[str, Any], name: str, source: str) -> _Section:
+    arguments = {
+        entry.name: _value(entry.type, values[name][entry.name], f"{source}: {name}.{entry.name}")
+        for entry in fields(kind)  # type: ignore[arg-type]  # every kind is a dataclass
+    }
+    return kind(**arguments)
+
+
+def _value(wanted: object, value: object, where: str) -> object:
+    """Return a value of the wanted type; all numbers of a profile are at least 0."""
+    if wanted is bool or wanted is str:
+        if not isinstance(value, wanted):
+            raise ProfileError(f"{where} is {value!r}; it must be {'true or false' if wanted is bool else 'a text'}")
+        return value
+    if wanted in {int, float}:
+        is_number = isinstance(value, int if wanted is int else int | float) and not isinstance(value, bool)
+        if not is_number or not (0 <= value < math.inf):  # type: ignore[operator]  # a number by now
+            raise ProfileError(
+                f"{where} is {value!r}; it must be a {'whole number' if wanted is int else 'number'} from 0 up"
+            )
+        return wanted(value)  # type: ignore[operator]  # int or float
+    if not isinstance(value, list | tuple) or not all(isinstance(word, str) for word in value):
+        raise ProfileError(f"{where} is {value!r}; it must be a list of words")
+    return tuple(value)
+
+
+def _check_together(profile: Profile, source: str) -> None:
+    serial, motion, limits = profile.serial, profile.motion, profile.limits
+    unknown = [number for number in profile.waive if number not in specification()]
+    musts = [number for number in profile.waive if number not in unknown and specification()[number].level == "must"]
+    checks = (
+        (not 1 <= serial.decimals <= 6, f"serial.decimals is {serial.decimals}; it must be 1 to 6"),
+        (serial.buffer_bytes < 33, f"serial.buffer_bytes is {serial.buffer_bytes}; a line alone needs 33"),
+        (
+            serial.latency_s >= serial.timeout_s,
+            f"serial.timeout_s is {serial.timeout_s:g}; it must be more than serial.latency_s, {serial.latency_s:g}",
+        ),
+        (profile.table.counts_per_deg <= 0, "table.counts_per_deg is 0; it must be greater"),
+        (
+            profile.tolerance.tracking_deg <= profile.tolerance.rest_deg,
+            f"tolerance.tracking_deg is {profile.tolerance.tracking_deg:g}; it must be more than tolerance.rest_deg, "
+            f"{profile.tolerance.rest_deg:g}",
+        ),
+        (bool(unknown), f"waive names {', '.join(unknown)}, which is no clause"),
+        (bool(musts), f"waive names {', '.join(musts)}, which is a must; only a should can be waived"),
+    )
+    for is_wrong, sentence in checks:
+        if is_wrong:
+            raise ProfileError(f"{source}: {sentence}")
+    for key in ("speed_deg_s", "acceleration_deg_s2"):
+        limit = getattr(limits, key)
+        for section, values in (("motion", motion), ("power_on", profile.power_on)):
+            if not 0 < (value := getattr(values, key)) <= limit:
+                raise ProfileError(
+                    f"{source}: {section}.{key} is {value:g}; "
+                    f"it must be greater than 0 and at most limits.{key}, {limit:g}"
+                )

@@ -1,0 +1,172 @@
+"""What can be done to the table besides talking to it: trigger it, switch it off and on, preset its counter.
+
+Who stands behind the port decides which of these there are: a table in the same process (the port has a `table`), the
+control channel of a stand-in, programs that the profile names, or nobody.
+"""
+
+import json
+import socket
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+from protocol.conformance.profile import Profile
+from protocol.port import Port
+
+TRIGGER = "a trigger input that the rig can drive"
+POWER_CYCLE = "a way to switch the table off and on"
+PRESET = "a way to preset the position counter"
+ERROR_REPLIES = "error replies"
+STRICT = "strict Table 1 mode"
+DISCONNECT = "a table that sees its client go"
+PACING = "a paced line"
+RANDOM_SEARCH = "the library hypothesis"
+
+_TIMEOUT_S = 5.0
+
+
+class StandError(Exception):
+    """Something beside the wire did not work; the message says what."""
+
+
+class Stand(Protocol):
+    """What the rig can do; calling what is not among the capabilities is an error of the case."""
+
+    capabilities: frozenset[str]
+
+    def trigger(self) -> None:
+        """Put one edge on the trigger input, now."""
+        ...
+
+    def power_cycle(self) -> None:
+        """Switch the table off and on."""
+        ...
+
+    def preset(self, count: int) -> None:
+        """Switch the table off and on, with its counter at `count`."""
+        ...
+
+
+class WireOnly:
+    """Nobody stands beside the wire."""
+
+    capabilities: frozenset[str] = frozenset()
+
+    def trigger(self) -> None:
+        """Refuse."""
+        raise StandError("the rig has no way to trigger the table")
+
+    def power_cycle(self) -> None:
+        """Refuse."""
+        raise StandError("the rig has no way to switch the table off")
+
+    def preset(self, count: int) -> None:
+        """Refuse."""
+        raise StandError(f"the rig has no way to preset the counter to {count}")
+
+
+class InProcess:
+    """A simulated table behind a port of this process; it is used as what it offers, not as what it is."""
+
+    capabilities = frozenset({TRIGGER, POWER_CYCLE, PRESET})
+
+    def __init__(self, table: Any) -> None:  # noqa: ANN401  # the package that makes it is none of ours
+        self._table = table
+
+    def trigger(self) -> None:
+        """Put one edge on the trigger input, now."""
+        self._table.trigger()
+
+    def power_cycle(self) -> None:
+        """Switch the table off and on."""
+        self._table.reset()
+
+    def preset(self, count: int) -> None:
+        """Switch the table off and on, with its counter at `count`."""
+        self._table.reset(count)
+
+
+class ControlChannel:
+    """The control channel of a stand-in: a line of JSON each way on a Unix socket."""
+
+    capabilities = frozenset({TRIGGER, POWER_CYCLE, PRESET})
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._request("state")
+
+    def trigger(self) -> None:
+        """Put one edge on the trigger input, now."""
+        self._request("trigger")
+
+    def power_cycle(self) -> None:
+        """Switch the table off and on."""
+        self._request("reset")
+
+    def preset(self, count: int) -> None:
+        """Switch the table off and on, with its counter at `count`."""
+        self._request("reset", count=count)
+
+    def _request(self, command: str, **parameters: float) -> None:
+        request = json.dumps({"command": command, **parameters}).encode() + b"\n"
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
+                connection.settimeout(_TIMEOUT_S)
+                connection.connect(str(self._path))
+                connection.sendall(request)
+                with connection.makefile("rb") as lines:
+                    answer = json.loads(lines.readline() or b'{"ok": false, "error": "hung up"}')
+        except (OSError, ValueError) as error:
+            raise StandError(f"{self._path}: {error}; is this the --control socket of a running stand-in?") from error
+        if not answer["ok"]:
+            raise StandError(f"{self._path}: {command}: {answer['error']}")
+
+
+class Programs(WireOnly):
+    """Programs of the test bench that the profile names."""
+
+    def __init__(self, trigger_command: Sequence[str], power_cycle_command: Sequence[str]) -> None:
+        self._trigger_command = trigger_command
+        self._power_cycle_command = power_cycle_command
+        named = {TRIGGER: trigger_command, POWER_CYCLE: power_cycle_command}
+        self.capabilities = frozenset(capability for capability, command in named.items() if command)
+
+    def trigger(self) -> None:
+        """Run the trigger's program."""
+        self._run(self._trigger_command)
+
+    def power_cycle(self) -> None:
+        """Run the power switch's program."""
+        self._run(self._power_cycle_command)
+
+    @staticmethod
+    def _run(command: Sequence[str]) -> None:
+        try:
+            subprocess.run(command, check=True, timeout=60.0, capture_output=True)  # noqa: S603  # the profile's own
+        except (OSError, subprocess.SubprocessError) as error:
+            raise StandError(f"{command[0]}: {error}") from error
+
+
+def stand_beside(port: Port, control: Path | None, profile: Profile) -> Stand:
+    """Return what can be done to the table at a port.
+
+    Raises:
+        StandError: the control channel does not answer.
+    """
+    if control is not None:
+        return ControlChannel(control)
+    table = getattr(port, "table", None)
+    if table is not None:
+        return InProcess(table)
+    return Programs(profile.rig.trigger_command, profile.rig.power_cycle_command)
+
+
+def capabilities(stand: Stand, profile: Profile) -> frozenset[str]:
+    """Return all that cases may need and that there is: of the rig, of the table, of this installation."""
+    found = {ERROR_REPLIES if profile.serial.error_replies else STRICT}
+    if profile.rig.sees_disconnect:
+        found.add(DISCONNECT)
+    if profile.serial.baud:
+        found.add(PACING)
+    return stand.capabilities | found

@@ -1,0 +1,169 @@
+"""A session with a table: from rest, case after case, back to rest."""
+
+import re
+import traceback
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from decimal import Decimal
+from random import Random
+
+from protocol.conformance.case import Case
+from protocol.conformance.profile import Profile
+from protocol.conformance.rig import MotionRecord, Rig
+from protocol.conformance.stand import POWER_CYCLE, PRESET, Stand, StandError, capabilities
+from protocol.conformance.verdict import Measurement, NonconformityError, Verdict
+from protocol.conformance.wire import Event, RecordedPort, Wire
+
+_CANCEL = b"\x18\r"
+_POSITION = re.compile(rb"(?:^|\r)H (-?[0-9]+\.[0-9]+) *\r")
+_SETTLE_S = 0.3
+
+
+class SessionError(Exception):
+    """What is at the port cannot be tested; the message says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a case ended."""
+
+    case: Case
+    verdict: Verdict
+    reason: str
+    measurements: tuple[Measurement, ...] = ()
+    motion: MotionRecord | None = None
+    wire: tuple[Event, ...] = ()
+    seconds: float = 0.0
+
+
+class Session:
+    """The suite's hold on one table, from the first question until it stands where it stood.
+
+    Raises:
+        SessionError: what is at the port does not answer, is no table of this protocol, or is in motion.
+    """
+
+    def __init__(self, port: RecordedPort, profile: Profile, stand: Stand, seed: int = 0) -> None:
+        self._port = port
+        self._wire = Wire(port)
+        self._profile = profile
+        self._stand = stand
+        self._seed = seed
+        self._capabilities = capabilities(stand, profile)
+        self._home_deg = round(self._first_position())
+
+    def run(self, cases: Iterable[Case], report: Callable[[Outcome], None] = lambda _: None) -> list[Outcome]:
+        """Run cases one after the other; the table is stopped whatever ends the run, Ctrl-C too."""
+        outcomes = []
+        try:
+            for one in cases:
+                outcomes.append(self.run_case(one))
+                report(outcomes[-1])
+        finally:
+            self.stop()
+        return outcomes
+
+    def run_case(self, case: Case) -> Outcome:
+        """Run one case and leave the table at rest."""
+        lacking = self._lacking(case)
+        if lacking:
+            return Outcome(case, Verdict.SKIPPED, lacking)
+        first_event, begin_s = len(self._port.events), self._port.clock.now_s()
+        rig = Rig(self._wire, self._profile, self._stand, self._home_deg, Random(f"{self._seed} {case.id}"))  # noqa: S311  # no secret
+        verdict, reason = self._judged(case, rig)
+        seconds = self._port.clock.now_s() - begin_s
+        motion = rig.motion if rig.motion.samples else None
+        events = tuple(self._port.events[first_event:])
+        return Outcome(case, verdict, reason, tuple(rig.measurements), motion, events, seconds)
+
+    def stop(self) -> None:
+        """Stop the table, and bring it back to where the session began, if it still answers."""
+        try:
+            self._recover()
+            rig = Rig(self._wire, self._profile, self._stand, self._home_deg, Random(0))  # noqa: S311  # not used
+            rig.wait_for_rest()
+            rig.go_home()
+        except (NonconformityError, OSError):
+            return
+
+    def _judged(self, case: Case, rig: Rig) -> tuple[Verdict, str]:
+        """Return verdict and reason of a case, with the table stopped and its line empty where it failed."""
+        try:
+            if case.travel_deg or POWER_CYCLE in case.needs:
+                rig.go_home()
+            case.run(rig)
+            self._restore(case, rig)
+        except NonconformityError as error:
+            self._after_failure(case)
+            return Verdict.FAIL, str(error)
+        except (OSError, StandError) as error:
+            return Verdict.ERROR, f"{type(error).__name__}: {error}"
+        except Exception as error:  # noqa: BLE001  # a fault of the case itself ends that case alone
+            self._after_failure(case)
+            return Verdict.ERROR, "".join(traceback.format_exception_only(error)).strip()
+        failed = [measurement for measurement in rig.measurements if measurement.verdict is Verdict.FAIL]
+        marginal = [measurement for measurement in rig.measurements if measurement.verdict is Verdict.MARGINAL]
+        if failed:
+            return Verdict.FAIL, "; ".join(map(str, failed))
+        return (Verdict.MARGINAL, "; ".join(map(str, marginal))) if marginal else (Verdict.PASS, "")
+
+    def _lacking(self, case: Case) -> str:
+        """Return why a case cannot be run, or nothing."""
+        waived = self._profile.waive.get(case.clause.number)
+        if waived is not None:
+            return f"waived by the profile: {waived}"
+        lacking = sorted(case.needs - self._capabilities)
+        if lacking:
+            return f"lacks {' and '.join(lacking)}"
+        if case.travel_deg > self._profile.motion.reach_deg:
+            return f"turns by {case.travel_deg:g} deg, the profile allows {self._profile.motion.reach_deg:g}"
+        return ""
+
+    def _restore(self, case: Case, rig: Rig) -> None:
+        """Leave the counter at 0 where the case moved the zero: after a preset the table stands where it stood."""
+        if PRESET in case.needs:
+            self._stand.power_cycle()
+            self._home_deg = 0
+        elif POWER_CYCLE in case.needs:
+            rig.go_home()
+            self._home_deg = 0
+
+    def _after_failure(self, case: Case) -> None:
+        try:
+            self._recover()
+            rig = Rig(self._wire, self._profile, self._stand, self._home_deg, Random(0))  # noqa: S311  # not used
+            rig.wait_for_rest()
+            if {PRESET, POWER_CYCLE} & case.needs:
+                self._stand.power_cycle()
+                self._home_deg = 0
+        except (NonconformityError, OSError, StandError):
+            return
+
+    def _recover(self) -> None:
+        """Stop the table and empty the line, whatever is on it."""
+        self._wire.send(_CANCEL + b"R 0\r")
+        self._wire.listen(_SETTLE_S)
+
+    def _first_position(self) -> Decimal:
+        """Return where the table rests, or say why it cannot be tested."""
+        timeout_s = self._profile.serial.timeout_s
+        self._wire.send(_CANCEL)
+        self._wire.listen(_SETTLE_S)
+        readings = []
+        for _ in range(2):
+            self._wire.send(b"H\r")
+            line = self._wire.read_line(timeout_s)
+            heard = b"" if line is None else line.text + b"\r"
+            found = _POSITION.search(heard)
+            if not heard and not self._wire.forget():
+                raise SessionError(
+                    f"no answer to 'H' within {timeout_s:g} s; is the table on, the cable right, "
+                    f"and its rate {self._profile.serial.baud} baud?"
+                )
+            if found is None:
+                raise SessionError(f"'H' got {heard!r}, which is no position; this is no table of this protocol")
+            readings.append(Decimal(found[1].decode()))
+            self._wire.clock.sleep_s(_SETTLE_S)
+        if readings[0] != readings[1]:
+            raise SessionError(f"the table moves ({readings[0]}, then {readings[1]} deg); stop it first")
+        return readings[1]

@@ -1,0 +1,55 @@
+"""What a case finds: measurements with their ranges, and a verdict."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Verdict(StrEnum):
+    """How a case ended, the worse the later."""
+
+    PASS = "pass"  # noqa: S105  # no password
+    SKIPPED = "skipped"
+    MARGINAL = "marginal"
+    FAIL = "fail"
+    ERROR = "error"
+
+
+MARGIN = 0.1
+"""The share of a range, at each of its ends, in which a measurement is marginal."""
+
+
+class NonconformityError(Exception):
+    """The table did not do what the clause says; the message says what it did instead."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A measured quantity and the closed range that it must lie in; an end that is None is open."""
+
+    name: str
+    value: float
+    unit: str
+    least: float | None = None
+    most: float | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """Pass, or marginal near an end of the range, or fail outside of it."""
+        low = float("-inf") if self.least is None else self.least
+        high = float("inf") if self.most is None else self.most
+        if not low <= self.value <= high:
+            return Verdict.FAIL
+        width = high - low
+        if width == float("inf"):  # one end is open: the margin is a share of the other
+            width = abs(low if self.most is None else high)
+        near = self.value - low < MARGIN * width or high - self.value < MARGIN * width
+        return Verdict.MARGINAL if near and width > 0 else Verdict.PASS
+
+    def __str__(self) -> str:
+        if self.least is None:
+            allowed = f"at most {self.most:.6g}"
+        elif self.most is None:
+            allowed = f"at least {self.least:.6g}"
+        else:
+            allowed = f"{self.least:.6g} to {self.most:.6g}"
+        return f"{self.name} {self.value:.5g} {self.unit} (allowed: {allowed})"

@@ -1,0 +1,142 @@
+"""The port as lines and times, with a record of every byte that passed."""
+
+from typing import Literal, NamedTuple, Protocol
+
+from protocol.clock import Clock, clock_of
+from protocol.port import Port
+
+CR = b"\r"
+
+
+class ReopenablePort(Port, Protocol):
+    """A port of pyserial's, which can be opened again."""
+
+    def open(self) -> None:
+        """Take the port."""
+        ...
+
+
+class Event(NamedTuple):
+    """Bytes that passed at one time: those of one write, or of one line received, at its first byte."""
+
+    time_s: float
+    direction: Literal["sent", "received"]
+    data: bytes
+
+
+class RecordedPort:
+    """A port that keeps what passes through it.
+
+    Attributes:
+        clock: that of the port, simulated or real.
+        events: what passed, in order.
+    """
+
+    def __init__(self, port: ReopenablePort) -> None:
+        self.clock: Clock = clock_of(port)
+        self.events: list[Event] = []
+        self._port = port
+
+    @property
+    def timeout(self) -> float | None:
+        """How long `read` waits, in seconds."""
+        return self._port.timeout
+
+    @timeout.setter
+    def timeout(self, timeout_s: float | None) -> None:
+        self._port.timeout = timeout_s
+
+    @property
+    def in_waiting(self) -> int:
+        """The number of bytes that can be read at once."""
+        return self._port.in_waiting
+
+    def read(self, size: int, /) -> bytes:
+        """Return `size` bytes, or fewer when `timeout` has passed."""
+        data = self._port.read(size)
+        if data:
+            last = self.events[-1] if self.events else None
+            if last is not None and last.direction == "received" and not last.data.endswith(CR):
+                self.events[-1] = last._replace(data=last.data + data)
+            else:
+                self.events.append(Event(self.clock.now_s(), "received", data))
+        return data
+
+    def write(self, data: bytes, /) -> int | None:
+        """Send all of `data`."""
+        self.events.append(Event(self.clock.now_s(), "sent", data))
+        return self._port.write(data)
+
+    def open(self) -> None:
+        """Take the port again."""
+        self._port.open()
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._port.close()
+
+
+class Line(NamedTuple):
+    """A received line without its CR, the times of its first byte and of its CR, and the longest gap in it."""
+
+    text: bytes
+    first_s: float
+    last_s: float
+    gap_s: float = 0.0
+
+
+class Wire:
+    """Sends bytes, and gathers lines with the times of their bytes."""
+
+    def __init__(self, port: RecordedPort) -> None:
+        self.port = port
+        self.clock = port.clock
+        self._rest = bytearray()
+        self._times: list[float] = []
+
+    def send(self, data: bytes) -> float:
+        """Send bytes and return the time before the first of them."""
+        now_s = self.clock.now_s()
+        self.port.write(data)
+        return now_s
+
+    def read_line(self, timeout_s: float) -> Line | None:
+        """Return the next line, or None when none is complete in time."""
+        deadline_s = self.clock.now_s() + timeout_s
+        while (end := self._rest.find(CR)) < 0:
+            if not self._receive(deadline_s - self.clock.now_s()):
+                return None
+        text, times = bytes(self._rest[:end]), self._times[: end + 1]
+        del self._rest[: end + 1], self._times[: end + 1]
+        gaps = (later - earlier for earlier, later in zip(times, times[1:], strict=False))
+        return Line(text, times[0], times[-1], max(gaps, default=0.0))
+
+    def listen(self, duration_s: float) -> bytes:
+        """Return, and forget, all that has come and comes in this time."""
+        deadline_s = self.clock.now_s() + duration_s
+        while (left_s := deadline_s - self.clock.now_s()) > 0.0:
+            self._receive(left_s)
+        return self.forget()
+
+    def forget(self) -> bytes:
+        """Return, and forget, what has been received and not been read as a line."""
+        heard = bytes(self._rest)
+        self._rest.clear()
+        self._times.clear()
+        return heard
+
+    def reopen(self) -> None:
+        """Leave the port and come back, as a new client does."""
+        self.port.close()
+        self.forget()
+        self.port.open()
+
+    def _receive(self, timeout_s: float) -> bool:
+        """Wait for a byte; return False when none came in time."""
+        if timeout_s <= 0.0:
+            return False
+        self.port.timeout = timeout_s
+        data = self.port.read(1)
+        self._rest += data
+        self._times += [self.clock.now_s()] * len(data)
+        return bool(data)
