@@ -5,6 +5,7 @@ what the flange carries once for all of them, and each further check only where 
 Memory grows with the maps alone.
 """
 
+import hashlib
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -78,10 +79,14 @@ def build_maps(
             _rate_columns(*cells, first, *window, *_NO_POSES)
         if progress is not None:
             progress(last, n_locations)
-    texts = reason_texts(problem.pair_names, [factor.name for factor in user_factors])
+    metadata = {
+        "scan": problem.name,
+        "digest": _digest(cells, [factor.name for factor in user_factors]),
+        "reasons": reason_texts(problem.pair_names, [factor.name for factor in user_factors]),
+    }
     return {
         configuration: ConfigurationMap(
-            values[c], reasons[c], metadata={"configuration": configuration.label, "reasons": texts}
+            values[c], reasons[c], metadata=metadata | {"configuration": configuration.label}
         )
         for c, configuration in enumerate(configurations)
     }
@@ -125,6 +130,14 @@ def _cells(problem: MapProblem, configurations: Sequence[Configuration], n_angle
         *model.field,
         base_in_obstacles(model, angles_deg),
     )
+
+
+def _digest(cells: _Cells, user_factor_names: Sequence[str]) -> str:
+    """Return a digest of all that a map depends on, except which configurations were asked for and users' code."""
+    content = hashlib.sha256("\0".join(user_factor_names).encode())
+    for array in cells._replace(slots=np.empty(0, dtype=np.int64)):
+        content.update(np.ascontiguousarray(array).tobytes())
+    return content.hexdigest()[:16]
 
 
 def _rate_with_user_factors(

@@ -1,0 +1,35 @@
+"""The planner's command line: `python -m planner COMMAND ...`."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from planner.commands import map as map_command
+from planner.errors import PlannerError
+
+_BAD_INPUT = 2
+_INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit status: 0, 1 for a negative verdict, 2 for input that cannot be used."""
+    parser = argparse.ArgumentParser(
+        prog="python -m planner",
+        description="Plan the motion of a rotary table under a scanning robot arm.",
+        epilog="example: python -m planner map mould --out build/mould",
+    )
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    map_command.add_parser(commands)
+    chosen = parser.parse_args(arguments)
+    try:
+        return int(chosen.run(chosen))
+    except PlannerError as error:
+        print(error, file=sys.stderr)
+        return _BAD_INPUT
+    except KeyboardInterrupt:
+        print("\ninterrupted, nothing more was written", file=sys.stderr)
+        return _INTERRUPTED
+
+
+if __name__ == "__main__":
+    sys.exit(main())

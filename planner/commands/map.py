@@ -1,0 +1,104 @@
+"""`python -m planner map`: compute a scan's configuration maps, draw them, and say what can be reached."""
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+
+from planner.config_map import ConfigurationMap
+from planner.configuration import Configuration
+from planner.errors import PlannerError
+from planner.map_builder import build_maps
+from planner.map_file import save_maps
+from planner.map_plots import plot_map, plot_map_cylinder
+from planner.map_problem import map_problem
+from planner.progress import progress_line
+from planner.scan import load_scan, shipped_scans
+
+_FEWEST_ANGLES = 8
+_MOST_ANGLES = 36_000
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command to `python -m planner`."""
+    parser = commands.add_parser(
+        "map",
+        help="compute and draw a scan's configuration map",
+        description="Rate every location of a scan at every table angle, and say why the arm cannot be where it cannot.",
+        epilog="example: python -m planner map mould --configuration LEFTY-ABOVE-NOFLIP --out build/mould",
+    )
+    parser.add_argument("scan", metavar="SCAN", help=f"a scan file, or one of {', '.join(shipped_scans())}")
+    parser.add_argument(
+        "--configuration", metavar="NAME", default="all", help="such as LEFTY-ABOVE-NOFLIP, or all (the default)"
+    )
+    parser.add_argument(
+        "--angles", type=_angle_count, default=360, metavar="COUNT", help="table angles over one turn (default 360)"
+    )
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the map and its pictures")
+    parser.set_defaults(run=run)
+
+
+def _angle_count(text: str) -> int:
+    try:
+        count = int(text)
+    except ValueError:
+        count = 0
+    if not _FEWEST_ANGLES <= count <= _MOST_ANGLES:
+        raise argparse.ArgumentTypeError(
+            f"is {text}; allowed is a whole number from {_FEWEST_ANGLES} to {_MOST_ANGLES}"
+        )
+    return count
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write `map.npz`, `map.png` and `map_cylinder.png`, print what can be reached, and return the exit status."""
+    configurations = (
+        list(Configuration) if arguments.configuration == "all" else [Configuration.parse(arguments.configuration)]
+    )
+    problem = map_problem(load_scan(arguments.scan), progress_line("distance field", sys.stderr))
+    maps = build_maps(problem, configurations, arguments.angles, progress_line("map", sys.stderr))
+    drawn = most_reachable(maps)
+    out: Path = arguments.out
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        save_maps(out / "map.npz", maps)
+        plot_map(maps[drawn], out / "map.png")
+        plot_map_cylinder(maps[drawn], out / "map_cylinder.png")
+    except OSError as error:
+        raise PlannerError(f"{out}: the map cannot be written there ({error.strerror or error})") from error
+    sys.stdout.write(summary(problem.name, maps, drawn))
+    return 0
+
+
+def most_reachable(maps: Mapping[Configuration, ConfigurationMap]) -> Configuration:
+    """Return the configuration in which most locations can be reached, of equals the one with the best values."""
+
+    def merit(configuration: Configuration) -> tuple[int, float]:
+        each = maps[configuration]
+        return -len(each.blocked_locations), float(each.values.max(axis=1).mean())
+
+    return max(maps, key=merit)
+
+
+def summary(name: str, maps: Mapping[Configuration, ConfigurationMap], drawn: Configuration) -> str:
+    """Return what the maps say about the path, a line for each configuration."""
+    shape = maps[drawn]
+    lines = [
+        f"{name}: {shape.location_count} locations, {shape.angle_count} table angles",
+        f"{'configuration':20} {'cells allowed':>13} {'path reachable':>14}  locations reachable at no table angle",
+    ]
+    for configuration, each in maps.items():
+        blocked = each.blocked_locations
+        reachable = 1.0 - len(blocked) / each.location_count
+        lines.append(
+            f"{configuration.label:20} {each.allowed.mean():13.1%} {reachable:14.1%}  {_ranges(blocked) or 'none'}"
+        )
+    lines.append(f"drawn: {drawn.label}")
+    return "\n".join(lines) + "\n"
+
+
+def _ranges(numbers: Sequence[int]) -> str:
+    """Return ascending numbers with runs drawn together: 1-3, 7."""
+    runs = [[number for _, number in run] for _, run in groupby(enumerate(numbers), lambda item: item[1] - item[0])]
+    return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)

@@ -1,0 +1,114 @@
+"""Configuration maps on disk: one npz file holds the maps of one or more arm configurations with their metadata.
+
+`values` is `(n_configurations, n_locations, n_angles)`, `reasons` the same in bytes, `metadata` a JSON text. The same
+maps give the same bytes.
+"""
+
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planner.config_map import ConfigurationMap, ConfigurationMapError
+from planner.configuration import Configuration
+from planner.errors import PlannerError
+
+_FORMAT = "seventh-axis configuration maps"
+_FORMAT_VERSION = 1
+
+
+class MapFileError(PlannerError):
+    """A file that cannot be read, is damaged, or holds no configuration maps."""
+
+
+def save_maps(file: Path, maps: Mapping[Configuration, ConfigurationMap]) -> None:
+    """Write maps of one scan to `file`, which appears when it is whole.
+
+    Raises:
+        ValueError: There is no map, or one has no reasons, or they are of different shapes.
+        OSError: The file cannot be written.
+    """
+    if not maps:
+        raise ValueError("there is no map to save")
+    stored = list(maps.values())
+    metadata = {
+        "format": _FORMAT,
+        "format_version": _FORMAT_VERSION,
+        "software_version": _software_version(),
+        "configurations": [configuration.label for configuration in maps],
+        "epsilon": stored[0].epsilon,
+        "maps": [dict(each.metadata) for each in stored],
+    }
+    arrays = {
+        "values": np.stack([each.values for each in stored]),
+        "reasons": np.stack([_reasons(each) for each in stored]),
+        "metadata": np.array(json.dumps(metadata, sort_keys=True)),
+    }
+    partial = file.with_name(f".{file.name}.{os.getpid()}.partial")
+    try:
+        with partial.open("wb") as stream:
+            np.savez_compressed(stream, **arrays)  # type: ignore[arg-type] - the stub takes a name for a keyword
+        partial.replace(file)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def load_maps(file: Path) -> dict[Configuration, ConfigurationMap]:
+    """Return the maps in a file, by configuration.
+
+    Raises:
+        MapFileError: The file cannot be read, is damaged, or is not one of ours.
+    """
+    arrays = _read(file)
+    try:
+        metadata = json.loads(str(arrays["metadata"]))
+        if metadata["format"] != _FORMAT:
+            raise KeyError(_FORMAT)
+        if metadata["format_version"] != _FORMAT_VERSION:
+            raise MapFileError(
+                f"{file}: its format version is {metadata['format_version']}; this program reads {_FORMAT_VERSION}"
+            )
+        configurations = [Configuration.parse(name) for name in metadata["configurations"]]
+        parts = zip(configurations, arrays["values"], arrays["reasons"], metadata["maps"], strict=True)
+        return {
+            configuration: ConfigurationMap(values, reasons, metadata["epsilon"], _with_codes(about))
+            for configuration, values, reasons, about in parts
+        }
+    except ConfigurationMapError as error:
+        raise MapFileError(f"{file}: damaged: {error}") from error
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise MapFileError(f"{file}: holds no configuration maps that this program has written") from error
+
+
+def _read(file: Path) -> dict[str, Any]:
+    try:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except OSError as error:
+        raise MapFileError(f"{file}: cannot be read ({error.strerror or error})") from error
+    except (ValueError, EOFError, KeyError, AttributeError, TypeError, zipfile.BadZipFile, zlib.error) as error:
+        raise MapFileError(f"{file}: is damaged, or not an npz file at all") from error
+
+
+def _with_codes(about: dict[str, Any]) -> dict[str, object]:
+    """Return a map's metadata with the codes of its reasons as numbers again: JSON knows texts as keys only."""
+    return about | {"reasons": {int(code): text for code, text in about.get("reasons", {}).items()}}
+
+
+def _reasons(configuration_map: ConfigurationMap) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    if configuration_map.reasons is None:
+        raise ValueError("a map without reasons cannot be saved")
+    return configuration_map.reasons
+
+
+def _software_version() -> str:
+    try:
+        return version("seventh-axis")
+    except PackageNotFoundError:  # run from a checkout that was not installed
+        return "unknown"
