@@ -7,7 +7,7 @@ control channel of a stand-in, programs that the profile names, or nobody.
 import json
 import socket
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -146,6 +146,30 @@ class Programs(WireOnly):
             subprocess.run(command, check=True, timeout=60.0, capture_output=True)  # noqa: S603  # the profile's own
         except (OSError, subprocess.SubprocessError) as error:
             raise StandError(f"{command[0]}: {error}") from error
+
+
+class RecordedStand:
+    """Another stand, whose deeds stand in the record of the wire."""
+
+    def __init__(self, stand: Stand, note: Callable[[str], None]) -> None:
+        self.capabilities = stand.capabilities
+        self._stand = stand
+        self._note = note
+
+    def trigger(self) -> None:
+        """Put one edge on the trigger input, now."""
+        self._note("trigger")
+        self._stand.trigger()
+
+    def power_cycle(self) -> None:
+        """Switch the table off and on."""
+        self._note("power_cycle")
+        self._stand.power_cycle()
+
+    def preset(self, count: int) -> None:
+        """Switch the table off and on, with its counter at `count`."""
+        self._note(f"preset {count}")
+        self._stand.preset(count)
 
 
 def stand_beside(port: Port, control: Path | None, profile: Profile) -> Stand:

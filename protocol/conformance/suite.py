@@ -10,7 +10,7 @@ from random import Random
 from protocol.conformance.case import Case
 from protocol.conformance.profile import Profile
 from protocol.conformance.rig import MotionRecord, Rig
-from protocol.conformance.stand import POWER_CYCLE, PRESET, Stand, StandError, capabilities
+from protocol.conformance.stand import POWER_CYCLE, PRESET, RecordedStand, Stand, StandError, capabilities
 from protocol.conformance.verdict import Measurement, NonconformityError, Verdict
 from protocol.conformance.wire import Event, RecordedPort, Wire
 
@@ -39,6 +39,10 @@ class Outcome:
 class Session:
     """The suite's hold on one table, from the first question until it stands where it stood.
 
+    Attributes:
+        capabilities: what cases may need and what there is.
+        home_deg: where the session began, and each moving case begins.
+
     Raises:
         SessionError: what is at the port does not answer, is no table of this protocol, or is in motion.
     """
@@ -47,10 +51,10 @@ class Session:
         self._port = port
         self._wire = Wire(port)
         self._profile = profile
-        self._stand = stand
+        self._stand: Stand = RecordedStand(stand, port.note)
         self._seed = seed
-        self._capabilities = capabilities(stand, profile)
-        self._home_deg = round(self._first_position())
+        self.capabilities = capabilities(stand, profile)
+        self.home_deg = round(self._first_position())
 
     def run(self, cases: Iterable[Case], report: Callable[[Outcome], None] = lambda _: None) -> list[Outcome]:
         """Run cases one after the other; the table is stopped whatever ends the run, Ctrl-C too."""
@@ -69,7 +73,7 @@ class Session:
         if lacking:
             return Outcome(case, Verdict.SKIPPED, lacking)
         first_event, begin_s = len(self._port.events), self._port.clock.now_s()
-        rig = Rig(self._wire, self._profile, self._stand, self._home_deg, Random(f"{self._seed} {case.id}"))  # noqa: S311  # no secret
+        rig = Rig(self._wire, self._profile, self._stand, self.home_deg, Random(f"{self._seed} {case.id}"))  # noqa: S311  # no secret
         verdict, reason = self._judged(case, rig)
         seconds = self._port.clock.now_s() - begin_s
         motion = rig.motion if rig.motion.samples else None
@@ -80,7 +84,7 @@ class Session:
         """Stop the table, and bring it back to where the session began, if it still answers."""
         try:
             self._recover()
-            rig = Rig(self._wire, self._profile, self._stand, self._home_deg, Random(0))  # noqa: S311  # not used
+            rig = Rig(self._wire, self._profile, self._stand, self.home_deg, Random(0))  # noqa: S311  # not used
             rig.wait_for_rest()
             rig.go_home()
         except (NonconformityError, OSError):
@@ -112,7 +116,7 @@ class Session:
         waived = self._profile.waive.get(case.clause.number)
         if waived is not None:
             return f"waived by the profile: {waived}"
-        lacking = sorted(case.needs - self._capabilities)
+        lacking = sorted(case.needs - self.capabilities)
         if lacking:
             return f"lacks {' and '.join(lacking)}"
         if case.travel_deg > self._profile.motion.reach_deg:
@@ -123,19 +127,19 @@ class Session:
         """Leave the counter at 0 where the case moved the zero: after a preset the table stands where it stood."""
         if PRESET in case.needs:
             self._stand.power_cycle()
-            self._home_deg = 0
+            self.home_deg = 0
         elif POWER_CYCLE in case.needs:
             rig.go_home()
-            self._home_deg = 0
+            self.home_deg = 0
 
     def _after_failure(self, case: Case) -> None:
         try:
             self._recover()
-            rig = Rig(self._wire, self._profile, self._stand, self._home_deg, Random(0))  # noqa: S311  # not used
+            rig = Rig(self._wire, self._profile, self._stand, self.home_deg, Random(0))  # noqa: S311  # not used
             rig.wait_for_rest()
             if {PRESET, POWER_CYCLE} & case.needs:
                 self._stand.power_cycle()
-                self._home_deg = 0
+                self.home_deg = 0
         except (NonconformityError, OSError, StandError):
             return
 

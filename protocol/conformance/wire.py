@@ -17,10 +17,10 @@ class ReopenablePort(Port, Protocol):
 
 
 class Event(NamedTuple):
-    """Bytes that passed at one time: those of one write, or of one line received, at its first byte."""
+    """What passed at one time: the bytes of one write, a line received (at its first byte), or a deed beside the wire."""
 
     time_s: float
-    direction: Literal["sent", "received"]
+    direction: Literal["sent", "received", "beside"]
     data: bytes
 
 
@@ -66,6 +66,10 @@ class RecordedPort:
         """Send all of `data`."""
         self.events.append(Event(self.clock.now_s(), "sent", data))
         return self._port.write(data)
+
+    def note(self, deed: str) -> None:
+        """Record what is done to the table beside the wire."""
+        self.events.append(Event(self.clock.now_s(), "beside", deed.encode()))
 
     def open(self) -> None:
         """Take the port again."""

@@ -1,0 +1,38 @@
+"""Opening the port of the table under test."""
+
+from pathlib import Path
+
+from protocol.conformance.profile import Profile
+from protocol.conformance.suite import SessionError
+from protocol.conformance.wire import ReopenablePort
+
+_STAND_IN_PACKAGE = "emulator"
+"""Where pyserial looks for the stand-in's own kind of URL, `emulator://`; it need not be installed."""
+
+
+def open_port(url: str, profile: Profile) -> ReopenablePort:
+    """Open a device or any URL of pyserial's, at the profile's rate.
+
+    Raises:
+        SessionError: it cannot be opened.
+    """
+    import serial  # noqa: PLC0415 - the pytest plug-in is loaded by runs that need no port
+
+    if _STAND_IN_PACKAGE not in serial.protocol_handler_packages:
+        serial.protocol_handler_packages.append(_STAND_IN_PACKAGE)
+    times = {"timeout": profile.serial.timeout_s, "write_timeout": profile.serial.timeout_s}
+    try:
+        return serial.serial_for_url(url, baudrate=profile.serial.baud or 9600, **times)
+    except (OSError, ValueError) as error:
+        raise SessionError(f"cannot open {url}: {error}; check the name, the rights and the table") from error
+
+
+def is_simulated(port: object) -> bool:
+    """Return whether the port carries its own clock: then nothing real moves behind it."""
+    return getattr(port, "clock", None) is not None
+
+
+def described(url: str) -> str:
+    """Return what device a URL leads to, links followed."""
+    path = Path(url)
+    return f"{url} ({path.resolve()})" if path.is_symlink() else url
