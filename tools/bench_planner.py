@@ -3,7 +3,7 @@
 import ctypes
 import gc
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,8 +16,8 @@ from planner.cost_to_go import Grid, cost_to_go, exact_grid, lay_out_columns
 from planner.dijkstra import Cells, lattice_path
 from planner.dynamic_programming import dynamic_programming, follow
 from planner.motion import Limits
-from planner.plan import Plan
-from planner.planners import PLANNERS
+from planner.plan import Outcome, Plan
+from planner.planners import PLANNERS, Planner
 from planner.problem import Problem
 from planner.ray_shooting import Rays, ray_shooting
 from planner.receding import online_step, prepare_online_step, receding
@@ -26,11 +26,6 @@ from planner.synthetic_maps import MapFamily, synthetic_map
 from planner.verification import verify
 
 MAPS_PER_FAMILY = 20
-
-COMPARED = {
-    **{name: PLANNERS[name] for name in ("dynamic_programming", "receding", "guided_ray_shooting", "ray_shooting")},
-    "ray_shooting+smoothing": lambda problem: _smoothed_rays(problem),
-}
 
 
 class Family(NamedTuple):
@@ -54,6 +49,18 @@ FAMILIES = (
     Family("short steps", MapFamily(0.2, 6.0), step_s=0.1),
     Family("long steps", MapFamily(0.3, 5.0), step_s=1.0),
 )
+
+
+def smoothed_ray_shooting(problem: Problem) -> Outcome:
+    """Return the plan of ray shooting, smoothed."""
+    outcome = ray_shooting(problem)
+    return smooth(problem, outcome) if isinstance(outcome, Plan) else outcome
+
+
+COMPARED: Mapping[str, Planner] = {
+    **{name: PLANNERS[name] for name in ("dynamic_programming", "receding", "guided_ray_shooting", "ray_shooting")},
+    "ray_shooting+smoothing": smoothed_ray_shooting,
+}
 
 
 class Tally(NamedTuple):
@@ -142,7 +149,7 @@ def _row(tally: Tally) -> str:
     milliseconds = 1e3 * float(np.median(tally.seconds)) if tally.seconds else np.nan
     return (
         f"{ratios.mean():11.4f} {np.percentile(ratios, 95):6.3f} {ratios.max():6.3f} "
-        f"{100.0 * float(np.mean(tally.touched or [0])):6.0f} % {sum(tally.pauses):7d} "
+        f"{100.0 * float(np.mean(tally.touched or [False])):6.0f} % {sum(tally.pauses):7d} "
         f"{milliseconds:8.2f} {milliseconds * 10.0:7.1f}"
     )
 
@@ -178,12 +185,6 @@ def lattice_optimum(problem: Problem) -> Plan | None:
     return follow(problem, cost_to_go(problem, exact_grid(problem, refinement, jump_count=1001)))
 
 
-def _smoothed_rays(problem: Problem) -> Plan:
-    plan = ray_shooting(problem)
-    assert isinstance(plan, Plan)
-    return smooth(problem, plan)
-
-
 def _bench_growth(stream: TextIO) -> None:
     print("\nGrowth of the whole plan (dynamic programming; receding)", file=stream)
     for columns, angles in ((100, 100), (200, 100), (400, 100), (100, 200), (100, 400), (1000, 100)):
@@ -191,9 +192,7 @@ def _bench_growth(stream: TextIO) -> None:
         problem = Problem(synthetic_map(family, 3), step_s=0.25)
         whole = median_seconds(partial(dynamic_programming, problem), 3)
         online = median_seconds(partial(receding, problem), 3)
-        print(
-            f"  {columns:5d} columns x {angles:4d} angles  {whole * 1e3:9.2f} ms {online * 1e3:9.2f} ms", file=stream
-        )
+        print(f"  {columns:5d} columns x {angles:4d} angles  {whole * 1e3:9.2f} ms {online * 1e3:9.2f} ms", file=stream)
     problem = Problem(synthetic_map(MapFamily(0.1, 6.0), 3), limits=Limits(40.0, 80.0))
     print("Growth of the cost-to-go of 100 x 100 with the speeds, 21 accelerations", file=stream)
     for half in (25, 50, 100, 200):

@@ -1,0 +1,96 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.plan import Plan
+from planner.ray_shooting import cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
+from planner.verification import verify
+from tools.figures import (
+    FIGURES,
+    MOMENTS,
+    OBSTACLE_RAYS,
+    SHARED_CELLS,
+    complete_rays,
+    main,
+    obstacle_problem,
+    shared_problem,
+)
+
+# Between the second obstacle's samples, in degrees, and halfway along it.
+SECOND_OBSTACLE_DEG, SECOND_OBSTACLE_LOCATION = (54.0, 144.0), 64
+
+
+def ways_at(moment: int) -> set[str]:
+    """Return on which sides of the second obstacle the rays from the plan's state at a moment get past both."""
+    problem = obstacle_problem()
+    plan = ray_shooting(problem, OBSTACLE_RAYS)
+    assert isinstance(plan, Plan)
+    rays = complete_rays(problem, plan, moment)
+    at_obstacle = [ray[min(SECOND_OBSTACLE_LOCATION - moment, len(ray) - 1)] for ray in rays]
+    return {"left" if angle < SECOND_OBSTACLE_DEG[0] else "between" for angle in at_obstacle}
+
+
+def test_the_rays_first_see_a_way_left_of_both_obstacles_then_one_between_them() -> None:
+    assert ways_at(MOMENTS[0]) == {"left"}
+    assert ways_at(MOMENTS[1]) == {"left", "between"}
+
+
+def test_of_the_two_ways_the_cheaper_is_taken_and_the_rotation_reverses() -> None:
+    problem = obstacle_problem()
+    plan = ray_shooting(problem, OBSTACLE_RAYS)
+    assert isinstance(plan, Plan)
+    accelerations = ray_accelerations(OBSTACLE_RAYS.rays, problem.limits.acceleration_deg_s2)
+    chosen = []
+    for moment in MOMENTS[:2]:
+        state = float(plan.angles_deg[moment]), float(plan.speeds_deg_s[moment])
+        empty = no_cost_to_go(problem)
+        best = cheapest_ray(problem.terms, accelerations, moment, OBSTACLE_RAYS.horizon, empty, *state)
+        chosen.append(accelerations[best])
+    assert chosen[0] < 0.0 < chosen[1] < abs(chosen[0])
+    assert plan.angles_deg[SECOND_OBSTACLE_LOCATION] > SECOND_OBSTACLE_DEG[1]
+    assert plan.speeds_deg_s.min() < 0.0 < plan.speeds_deg_s[SECOND_OBSTACLE_LOCATION]
+    assert verify(problem, plan).is_executable
+    assert plan.pauses == ()
+
+
+def test_the_cells_of_fig_7_are_an_exact_lattice() -> None:
+    problem = shared_problem()
+    step_deg = 360.0 / SHARED_CELLS.angle_count
+    speed_step = 2.0 * problem.limits.speed_deg_s / (SHARED_CELLS.speed_count - 1)
+    acceleration_step = 2.0 * problem.limits.acceleration_deg_s2 / (SHARED_CELLS.acceleration_count - 1)
+    for quantum in (
+        acceleration_step * problem.step_s / speed_step,
+        0.5 * speed_step * problem.step_s / step_deg,
+        (problem.start_angle_deg or 0.0) / step_deg,
+    ):
+        assert quantum == pytest.approx(round(quantum))
+
+
+@pytest.mark.parametrize("name", ["fig5", "fig6", "fig8", "fig9"])
+def test_a_figure_is_drawn_and_the_same_every_time(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for folder in ("first", "second"):
+        assert main(["--out", str(tmp_path / folder), name]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        str(tmp_path / folder / f"{name}.png") for folder in ("first", "second")
+    ]
+    first, second = ((tmp_path / folder / f"{name}.png").read_bytes() for folder in ("first", "second"))
+    assert first == second
+    assert [path.name for path in (tmp_path / "first").iterdir()] == [f"{name}.png"]
+
+
+def test_an_unknown_figure_is_refused_in_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fig4"]) == 2
+    assert "fig5, fig6" in capsys.readouterr().err
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    assert main(["--out", str(tmp_path / "file" / "below"), "fig5"]) == 2
+    assert "cannot write" in capsys.readouterr().err
+
+
+def test_every_figure_of_the_planner_is_there() -> None:
+    assert list(FIGURES) == [f"fig{number}" for number in np.arange(5, 10)]

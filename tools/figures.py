@@ -1,0 +1,278 @@
+"""Reproduce the paper's figures of the planner: `python -m tools.figures [--out DIR] [NAME...]`.
+
+Fig. 5 is the shape of Eq. (1), Fig. 6 a configuration map with a plan in both views, Fig. 7 the reference found by
+Dijkstra's algorithm, Fig. 8 ray shooting at four moments and Fig. 9 its speed and acceleration.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from mpl_toolkits.mplot3d.axes3d import Axes3D  # type: ignore[import-untyped]  # matplotlib has no types for it
+
+from planner.arrays import FloatArray
+from planner.config_map import ConfigurationMap
+from planner.cost import Weights
+from planner.crossing import step_is_allowed
+from planner.dijkstra import Cells, dijkstra
+from planner.dynamic_programming import dynamic_programming
+from planner.local_maxima import local_maxima
+from planner.motion import Limits, limited_acceleration, next_angle, next_speed
+from planner.plan import Outcome, Plan
+from planner.problem import Problem
+from planner.ray_shooting import Rays, cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
+from planner.synthetic_maps import MapFamily, blocks_map, synthetic_map
+from planner.value import joint_factor
+
+PLAN_COLOUR, RAY_COLOUR, OTHER_COLOUR = "#d62728", "#7fb2e5", "#1f77b4"
+
+# The joint whose factor Fig. 5 shows: joint 1 of the arm.
+JOINT_RANGE_DEG = (-170.0, 170.0)
+EXPONENTS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+
+# Fig. 6, 7 and 9 share one map. With these limits and cells each step of the graph ends exactly on a cell's centre, so
+# that the path in the graph is also what the table does.
+SHARED_FAMILY, SHARED_SEED = MapFamily(0.42, 6.0, 0.3), 11
+SHARED_STEP_S, SHARED_LIMITS = 0.5, Limits(36.0, 36.0)
+SHARED_CELLS = Cells(angle_count=400, speed_count=21, acceleration_count=11)
+
+# Fig. 8: obstacles as (first location, last location, first angle, last angle), samples of 3 deg.
+OBSTACLES = [(26, 40, 56, 112), (56, 72, 18, 48)]
+OBSTACLES_EDGE = 5
+MOMENTS = (0, 14, 30, 80)
+OBSTACLE_RAYS = Rays(31, 62)
+
+
+def shared_problem() -> Problem:
+    """Return the problem of Fig. 6, 7 and 9; it starts where the best plan does."""
+    free = Problem(synthetic_map(SHARED_FAMILY, SHARED_SEED), SHARED_STEP_S, SHARED_LIMITS)
+    return replace(free, start_angle_deg=float(_plan(dynamic_programming(free)).angles_deg[0]))
+
+
+def obstacle_problem() -> Problem:
+    """Return the problem of Fig. 8: at first the only way in sight is left of (below) both obstacles."""
+    return Problem(
+        blocks_map(96, 120, OBSTACLES, OBSTACLES_EDGE),
+        step_s=0.2,
+        limits=Limits(40.0, 10.0),
+        weights=Weights(0.02, 0.0005),
+        start_angle_deg=186.0,
+    )
+
+
+def figure_5() -> Figure:
+    """Shape of Eq. (1) for several exponents."""
+    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    axes = figure.subplots()
+    lower, upper = JOINT_RANGE_DEG
+    angles = np.linspace(lower, upper, 1001)
+    for exponent in EXPONENTS:
+        factor = [joint_factor(float(angle), lower, upper, exponent) for angle in angles]
+        axes.plot(angles, factor, label=f"$\\gamma$ = {exponent:g}")
+    axes.set(xlabel="joint angle (deg)", ylabel="$f_j$", xlim=JOINT_RANGE_DEG, ylim=(0.0, 1.05))
+    axes.set_title("Eq. (1): a joint's factor over its range")
+    axes.grid(visible=True, alpha=0.3)
+    axes.legend(loc="lower center", ncols=2)
+    return figure
+
+
+def figure_6() -> Figure:
+    """Return a grayscale configuration map with a solution: (a) 2D, (b) cylindrical view."""
+    problem = shared_problem()
+    plan = _plan(dynamic_programming(problem))
+    figure = Figure(figsize=(11.0, 4.8), layout="constrained")
+    flat = figure.add_subplot(1, 2, 1)
+    image = _draw_map(flat, problem.map)
+    _draw_path(flat, plan.angles_deg)
+    flat.set_title("(a) 2D view")
+    figure.colorbar(image, ax=flat, label="$f_R$", shrink=0.85)
+    round_view = figure.add_subplot(1, 2, 2, projection="3d")
+    assert isinstance(round_view, Axes3D)
+    _draw_cylinder(round_view, problem.map, plan.angles_deg)
+    round_view.set_title("(b) cylindrical view")
+    return figure
+
+
+def figure_7() -> Figure:
+    """Position, speed and acceleration of the path that Dijkstra's algorithm finds."""
+    return _motion_figure(dijkstra(shared_problem(), SHARED_CELLS), "Dijkstra's algorithm on the graph of Eq. (8)")
+
+
+def figure_8() -> Figure:
+    """Ray shooting at four moments: a way left of both obstacles first, then one between them, which is cheaper."""
+    problem = obstacle_problem()
+    plan = _plan(ray_shooting(problem, OBSTACLE_RAYS))
+    figure = Figure(figsize=(10.5, 7.4), layout="constrained")
+    titles = (
+        "(a) the rays see one way: left of both obstacles",
+        "(b) a ray finds a way between the obstacles",
+        "(c) that way is cheaper and is followed",
+        "(d) almost finished",
+    )
+    for axes, label, moment in zip(figure.subplots(2, 2, sharex=True, sharey=True).flat, titles, MOMENTS, strict=True):
+        _draw_map(axes, problem.map)
+        _draw_rays(axes, problem, plan, moment)
+        axes.plot(plan.angles_deg[: moment + 1], color=OTHER_COLOUR, linewidth=2.2, label="planned so far")
+        axes.plot(moment, plan.angles_deg[moment], "o", color=OTHER_COLOUR, markersize=6)
+        axes.set_title(label, fontsize=10)
+        axes.label_outer()
+    figure.axes[0].legend(loc="lower left", fontsize=8, framealpha=0.9)
+    return figure
+
+
+def figure_9() -> Figure:
+    """Position, speed and acceleration with ray shooting."""
+    return _motion_figure(ray_shooting(shared_problem()), "Ray shooting")
+
+
+def _motion_figure(outcome: Outcome, title: str) -> Figure:
+    problem, plan = shared_problem(), _plan(outcome)
+    figure = Figure(figsize=(7.2, 8.4), layout="constrained")
+    on_map, speed, acceleration = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
+    _draw_map(on_map, problem.map)
+    brightest = _plan(local_maxima(problem)).angles_deg
+    on_map.plot(brightest % 360.0, ".", color="#e7a33e", markersize=3, label="local maxima")
+    _draw_path(on_map, plan.angles_deg)
+    on_map.plot([], [], color=PLAN_COLOUR, label="plan")
+    on_map.legend(loc="upper right", fontsize=8)
+    on_map.set(xlabel="", title=f"{title}: cost {plan.cost.total:.1f}")
+    locations = np.arange(len(plan.angles_deg))
+    speed.plot(locations, plan.speeds_deg_s, color=OTHER_COLOUR)
+    speed.set_ylabel("speed (deg/s)")
+    acceleration.stairs(plan.accelerations_deg_s2, locations, color=OTHER_COLOUR, baseline=None)
+    acceleration.set(ylabel="acceleration (deg/s$^2$)", xlabel="scan location")
+    for axes, limit in ((speed, problem.limits.speed_deg_s), (acceleration, problem.limits.acceleration_deg_s2)):
+        axes.set_ylim(-1.1 * limit, 1.1 * limit)
+        for bound in (-limit, limit):
+            axes.axhline(bound, color="#888888", linestyle="--", linewidth=0.8)
+        axes.grid(visible=True, alpha=0.3)
+        for pause in plan.pauses:
+            axes.axvline(pause.step + 0.5, color="#e7a33e", linewidth=1.0)
+    return figure
+
+
+def _plan(outcome: Outcome) -> Plan:
+    assert isinstance(outcome, Plan), outcome
+    return outcome
+
+
+def _draw_map(axes: Axes, configuration_map: ConfigurationMap) -> AxesImage:
+    step = configuration_map.angle_step_deg
+    extent = (-0.5, configuration_map.location_count - 0.5, -0.5 * step, 360.0 - 0.5 * step)
+    image = axes.imshow(
+        configuration_map.values.T, cmap="gray", vmin=0.0, vmax=1.0, origin="lower", aspect="auto", extent=extent
+    )
+    axes.set(xlabel="scan location", ylabel="table angle (deg)", yticks=range(0, 361, 60))
+    return image
+
+
+def _draw_path(axes: Axes, angles_deg: FloatArray) -> None:
+    """Draw a path wrapped to one turn, interrupted where it passes 0."""
+    turn = np.floor(angles_deg / 360.0)
+    for value in np.unique(turn):
+        inside = np.where((turn == value) | (np.roll(turn, 1) == value), angles_deg - 360.0 * value, np.nan)
+        axes.plot(inside, color=PLAN_COLOUR, linewidth=2.0)
+    axes.set_ylim(0.0, 360.0 - 1e-9)
+
+
+def _draw_cylinder(axes: Axes3D, configuration_map: ConfigurationMap, angles_deg: FloatArray) -> None:
+    """Draw the map on a cylinder along the scan path, turned so that the path faces the reader."""
+    elevation, azimuth = np.radians(25.0), np.radians(-62.0)
+    towards_reader = np.arctan2(np.sin(elevation), np.sin(azimuth) * np.cos(elevation))
+    offset = towards_reader - np.radians(0.5 * (angles_deg.min() + angles_deg.max()))
+    locations = np.arange(configuration_map.location_count)
+    turn = np.radians(np.linspace(0.0, 360.0, configuration_map.angle_count + 1)) + offset
+    x, around = np.meshgrid(locations, turn, indexing="ij")
+    shade = configuration_map.values[:-1, :, None].repeat(3, axis=2)
+    axes.plot_surface(
+        x, np.cos(around), np.sin(around), facecolors=shade, rstride=1, cstride=1, shade=False, antialiased=False
+    )
+    path = np.radians(angles_deg) + offset
+    height = np.where(np.cos(path - towards_reader) > 0.05, 1.02, np.nan)
+    axes.plot(locations, height * np.cos(path), height * np.sin(path), color=PLAN_COLOUR, linewidth=2.5, zorder=10)
+    axes.set_box_aspect((2.2, 1.0, 1.0), zoom=1.3)
+    axes.view_init(elev=float(np.degrees(elevation)), azim=float(np.degrees(azimuth)))
+    axes.set(xlabel="scan location", yticks=[], zticks=[])
+
+
+def _draw_rays(axes: Axes, problem: Problem, plan: Plan, moment: int) -> None:
+    """Draw each ray from the state at a moment, as far as it is allowed; the chosen one in the plan's colour."""
+    accelerations = ray_accelerations(OBSTACLE_RAYS.rays, problem.limits.acceleration_deg_s2)
+    state = float(plan.angles_deg[moment]), float(plan.speeds_deg_s[moment])
+    empty = no_cost_to_go(problem)
+    chosen = cheapest_ray(problem.terms, accelerations, moment, OBSTACLE_RAYS.horizon, empty, *state)
+    rays = [_ray(problem, float(acceleration), moment, *state) for acceleration in accelerations]
+    for ray in rays:
+        axes.plot(np.arange(moment, moment + len(ray)), ray, color=RAY_COLOUR, linewidth=0.9)
+    best = rays[chosen]
+    axes.plot(np.arange(moment, moment + len(best)), best, color=PLAN_COLOUR, linewidth=2.0, label="cheapest ray")
+    axes.plot([], [], color=RAY_COLOUR, linewidth=0.9, label="rays")
+    axes.set_ylim(0.0, 359.0)
+
+
+def _ray(problem: Problem, acceleration: float, column: int, angle_deg: float, speed_deg_s: float) -> list[float]:
+    """Return the angles of a ray up to its horizon or to the forbidden region."""
+    terms, angles = problem.terms, [angle_deg]
+    for k in range(column, min(column + OBSTACLE_RAYS.horizon, problem.step_count)):
+        a = limited_acceleration(speed_deg_s, acceleration, terms.step_s, terms.speed_limit_deg_s)
+        if not step_is_allowed(terms.runs, k, angle_deg, speed_deg_s, a, terms.step_s):
+            break
+        angle_deg = next_angle(angle_deg, speed_deg_s, a, terms.step_s)
+        speed_deg_s = next_speed(speed_deg_s, a, terms.step_s)
+        angles.append(angle_deg)
+    return angles
+
+
+def complete_rays(problem: Problem, plan: Plan, moment: int) -> list[list[float]]:
+    """Return the rays from the plan's state at a moment that stay allowed up to their horizon."""
+    accelerations = ray_accelerations(OBSTACLE_RAYS.rays, problem.limits.acceleration_deg_s2)
+    state = float(plan.angles_deg[moment]), float(plan.speeds_deg_s[moment])
+    rays = [_ray(problem, float(acceleration), moment, *state) for acceleration in accelerations]
+    return [ray for ray in rays if len(ray) == min(OBSTACLE_RAYS.horizon, problem.step_count - moment) + 1]
+
+
+FIGURES: Mapping[str, Callable[[], Figure]] = {
+    "fig5": figure_5,
+    "fig6": figure_6,
+    "fig7": figure_7,
+    "fig8": figure_8,
+    "fig9": figure_9,
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Draw the figures asked for and print the files written."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tools.figures",
+        description="Reproduce Fig. 5 to 9 of the paper.",
+        epilog="example: python -m tools.figures --out build/figures fig8",
+    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"which figures (default: {' '.join(FIGURES)})")
+    parser.add_argument("--out", type=Path, default=Path("figures"), metavar="DIR", help="where to (default: figures)")
+    options = parser.parse_args(arguments)
+    unknown = [name for name in options.names if name not in FIGURES]
+    if unknown:
+        print(f"there is no figure {unknown[0]!r}; allowed are {', '.join(FIGURES)}", file=sys.stderr)
+        return 2
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+        for name in options.names or FIGURES:
+            path = options.out / f"{name}.png"
+            partial = options.out / f".{name}.partial.png"
+            FIGURES[name]().savefig(partial, dpi=150, metadata={"Software": None})
+            partial.replace(path)
+            print(path)
+    except OSError as error:
+        print(f"cannot write the figures to {options.out}: {error.strerror}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
