@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Self, get_type_hints
 
+from emulator.fixed_point import SPEED_BITS
+
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
 
 
@@ -25,27 +27,27 @@ def quantity(*, above: float | None = None, least: float | None = None, most: fl
 class MotorConfig:
     """The DC motor, from its datasheet."""
 
-    resistance_ohm: float = quantity(above=0)
-    inductance_H: float = quantity(above=0)
-    torque_constant_Nm_A: float = quantity(above=0)
-    rotor_inertia_kg_m2: float = quantity(above=0)
+    resistance_ohm: float = quantity(least=1e-3, most=1e4)
+    inductance_H: float = quantity(least=1e-6, most=10)
+    torque_constant_Nm_A: float = quantity(least=1e-6, most=100)
+    rotor_inertia_kg_m2: float = quantity(least=1e-10, most=10)
 
 
 @dataclass(frozen=True)
 class DriverConfig:
     """The PWM bridge."""
 
-    supply_V: float = quantity(above=0)
-    pwm_bits: int = quantity(least=4, most=15)
+    supply_V: float = quantity(above=0, most=1000)
+    pwm_bits: int = quantity(least=4, most=11)
 
 
 @dataclass(frozen=True)
 class GearsConfig:
     """The spur gear chain between motor and table."""
 
-    ratio: float = quantity(least=1)
-    efficiency: float = quantity(above=0, most=1)
-    inertia_kg_m2: float = quantity(least=0)
+    ratio: float = quantity(least=1, most=1e5)
+    efficiency: float = quantity(least=0.01, most=1)
+    inertia_kg_m2: float = quantity(least=0, most=10)
     backlash_arcmin: float = quantity(least=0, most=600)
 
 
@@ -53,18 +55,18 @@ class GearsConfig:
 class DiscConfig:
     """The table's disc with the workpiece on it."""
 
-    inertia_kg_m2: float = quantity(above=0)
-    bearing_friction_Nm: float = quantity(least=0)
+    inertia_kg_m2: float = quantity(least=1e-9, most=1e6)
+    bearing_friction_Nm: float = quantity(least=0, most=1e5)
 
 
 @dataclass(frozen=True)
 class FrictionConfig:
     """Friction of motor and gears at the motor's shaft."""
 
-    coulomb_Nm: float = quantity(least=0)
+    coulomb_Nm: float = quantity(least=0, most=1e3)
     stiction_ratio: float = quantity(least=1, most=10)
-    stribeck_speed_rad_s: float = quantity(above=0)
-    viscous_Nm_s: float = quantity(least=0)
+    stribeck_speed_rad_s: float = quantity(least=1e-3, most=1e4)
+    viscous_Nm_s: float = quantity(least=0, most=1)
 
 
 @dataclass(frozen=True)
@@ -86,9 +88,9 @@ class ControlConfig:
 class GainsConfig:
     """One PID gain set: u = K (e + integral(e) / Ti - Td d(omega)/dt), e in deg/s, u = 1 at full duty."""
 
-    proportional_duty_s_deg: float = quantity(least=0)
-    integral_time_s: float = quantity(above=0)
-    derivative_time_s: float = quantity(least=0)
+    proportional_duty_s_deg: float = quantity(least=0, most=1e6)
+    integral_time_s: float = quantity(least=1e-6, most=1e6)
+    derivative_time_s: float = quantity(least=0, most=1e3)
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ class SettlingConfig:
 
     arrival_count: int = quantity(least=0, most=100)
     approach_rate_1_s: float = quantity(above=0, most=100)
-    approach_speed_deg_s: float = quantity(above=0)
+    approach_speed_deg_s: float = quantity(above=0, most=1e6)
 
 
 @dataclass(frozen=True)
@@ -113,16 +115,16 @@ class ProtectionConfig:
     """When a motor that does not turn is switched off."""
 
     stall_duty: float = quantity(above=0, most=1)
-    stall_time_s: float = quantity(above=0)
-    settling_time_s: float = quantity(above=0)
+    stall_time_s: float = quantity(above=0, most=3600)
+    settling_time_s: float = quantity(above=0, most=3600)
 
 
 @dataclass(frozen=True)
 class MotionConfig:
     """A speed and an acceleration of the table."""
 
-    speed_deg_s: float = quantity(above=0)
-    acceleration_deg_s2: float = quantity(above=0)
+    speed_deg_s: float = quantity(above=0, most=1e6)
+    acceleration_deg_s2: float = quantity(above=0, most=1e9)
 
 
 @dataclass(frozen=True)
@@ -188,7 +190,7 @@ def _read(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # tomllib passes on that an integer has too many digits
         raise ConfigError(f"{path}: is not TOML: {error}") from error
 
 
@@ -225,7 +227,7 @@ def _number(wanted: type, value: object, limits: Any, where: str) -> float | int
         raise ConfigError(f"{where} is {value!r}; it must be {'true or false' if wanted is bool else 'a number'}")
     if not isinstance(value, int if wanted is int else (int, float)):
         raise ConfigError(f"{where} is {value!r}; it must be a {'whole number' if wanted is int else 'number'}")
-    if not math.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):
         raise ConfigError(f"{where} is {value!r}; it must be finite")
     above, least, most = (limits[key] for key in ("above", "least", "most"))
     broken = (
@@ -255,14 +257,18 @@ def _check_together(config: TableConfig, source: str) -> None:
 def _check_registers(config: TableConfig, source: str) -> None:
     """Refuse what does not fit the firmware's number formats; see `fixed_point`."""
     count_deg, tick_hz = config.counts_per_turn / 360.0, config.control.tick_hz
-    speed_most, acceleration_most = 31.0 * tick_hz / count_deg, tick_hz**2 / count_deg
-    if config.limits.speed_deg_s > speed_most:
-        raise ConfigError(
-            f"{source}: limits.speed_deg_s is {config.limits.speed_deg_s:g}; "
-            f"with this encoder and tick the firmware holds at most {speed_most:g}"
-        )
-    if config.limits.acceleration_deg_s2 > acceleration_most:
-        raise ConfigError(
-            f"{source}: limits.acceleration_deg_s2 is {config.limits.acceleration_deg_s2:g}; "
-            f"with this encoder and tick the firmware holds at most {acceleration_most:g}"
-        )
+    unit = 2.0**-SPEED_BITS
+    speeds_deg_s = (unit * tick_hz / count_deg, 31.0 * tick_hz / count_deg)
+    accelerations_deg_s2 = (unit * tick_hz**2 / count_deg, tick_hz**2 / count_deg)
+    held = (
+        ("limits.speed_deg_s", config.limits.speed_deg_s, speeds_deg_s),
+        ("limits.acceleration_deg_s2", config.limits.acceleration_deg_s2, accelerations_deg_s2),
+        ("power_on.speed_deg_s", config.power_on.speed_deg_s, speeds_deg_s),
+        ("power_on.acceleration_deg_s2", config.power_on.acceleration_deg_s2, accelerations_deg_s2),
+        ("settling.approach_speed_deg_s", config.settling.approach_speed_deg_s, speeds_deg_s),
+    )
+    for name, value, (least, most) in held:
+        if not least <= value <= most:
+            raise ConfigError(
+                f"{source}: {name} is {value:g}; with this encoder and tick the firmware holds {least:g} to {most:g}"
+            )

@@ -61,8 +61,8 @@ def firmware(config: TableConfig) -> Firmware:
         approach_rate=to_fixed(settling.approach_rate_1_s / tick_hz, SPEED_BITS),
         approach_speed=to_fixed(settling.approach_speed_deg_s * config.counts_per_turn / 360.0 / tick_hz, SPEED_BITS),
         stall_duty=round(protection.stall_duty * duty_max(config)),
-        stall_ticks=round(protection.stall_time_s * tick_hz),
-        settling_ticks=round(protection.settling_time_s * tick_hz),
+        stall_ticks=max(1, round(protection.stall_time_s * tick_hz)),
+        settling_ticks=max(1, round(protection.settling_time_s * tick_hz)),
     )
 
 
