@@ -29,7 +29,6 @@ from planner.value import (
     MINIMUM_CLEARANCE_MM,
     RatedPoses,
     UserFactor,
-    ValueFunction,
     clearance_factor,
     joint_ranges,
     joints_value,
@@ -113,7 +112,7 @@ class _Cells(NamedTuple):
 
 
 def _cells(problem: MapProblem, configurations: Sequence[Configuration], n_angles: int) -> _Cells:
-    angles_deg = np.arange(n_angles) * (360.0 / n_angles)
+    angles_deg = np.linspace(0.0, 360.0, n_angles, endpoint=False)
     model = problem.collision
     return _Cells(
         problem.cell.arm.table,
@@ -171,7 +170,7 @@ def _rates(factor: UserFactor, poses: RatedPoses) -> FloatArray:
 
 
 @kernel
-def _rate_columns(
+def _rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between would pass twenty of them on
     arm: FloatArray, table_poses: FloatArray, T_TF: FloatArray, value: FloatArray, ranges: FloatArray,
     slots: npt.NDArray[np.int64], beam_mm: float, n_common: int, pairs: npt.NDArray[np.int64], bodies: FloatArray,
     obstacles: FloatArray, field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
@@ -185,37 +184,39 @@ def _rate_columns(
     joints, codes = np.empty((8, 6)), np.empty(8, dtype=np.uint8)
     frames, placed = np.empty((7, 3, 4)), np.empty((len(bodies), 6))
     flange = frames[FLANGE_FRAME]
-    minimum_mm, comfortable_mm = value[MINIMUM_CLEARANCE_MM], value[COMFORTABLE_CLEARANCE_MM]
+    comfortable_mm = value[COMFORTABLE_CLEARANCE_MM]
     for column in range(values.shape[1]):
         for angle in range(values.shape[2]):
             _goal_pose(table_poses, angle, T_TF, first + column, flange)
             inverse(arm, flange, joints, codes)
             # What the flange carries is as far from the cell in all configurations; found when first asked for.
-            common_mm, common_pair, common_known = comfortable_mm, -1, False
+            common_mm, common_pair = comfortable_mm, -1
+            # No body turns with joints 4 and 5, so FLIP and NOFLIP have the same clearance.
+            clearance_mm, pair, known_arm = comfortable_mm, -1, -1
             for c in range(len(slots)):
                 slot = slots[c]
                 rated, reason = 0.0, int(codes[slot])
-                clearance_mm, pair = comfortable_mm, -1
                 if reason == _REACHED:
                     rated, reason = _posture_value(value, joints, ranges, slot)
                 if rated > 0.0 and value[CLEARANCE_EXPONENT] > 0.0:
-                    if not common_known:
-                        common_known = True
+                    if known_arm < 0:
                         place_bodies(bodies, frames, beam_mm, FLANGE_FRAME, FLANGE_FRAME, placed)
                         common_mm, common_pair = nearest_pair(
                             pairs, bodies, obstacles, field_values, field_origin, field_spacing,
                             placed, obstacle_frames, angle, 0, n_common, comfortable_mm,
                         )  # fmt: skip
-                    clearance_mm, pair = common_mm, common_pair
-                    if common_mm > minimum_mm:
-                        link_frames(arm, joints[slot], frames)
-                        place_bodies(bodies, frames, beam_mm, 0, FLANGE_FRAME - 1, placed)
-                        own_mm, own_pair = nearest_pair(
-                            pairs, bodies, obstacles, field_values, field_origin, field_spacing,
-                            placed, obstacle_frames, angle, n_common, len(pairs), common_mm,
-                        )  # fmt: skip
-                        if own_pair >= 0:
-                            clearance_mm, pair = own_mm, own_pair
+                    if known_arm != slot >> 1:
+                        known_arm = slot >> 1
+                        clearance_mm, pair = common_mm, common_pair
+                        # A tool that collides does so in every configuration: no need to look further.
+                        if common_mm > value[MINIMUM_CLEARANCE_MM]:
+                            link_frames(arm, joints[slot], frames)
+                            place_bodies(bodies, frames, beam_mm, 0, FLANGE_FRAME - 1, placed)
+                            clearance_mm, own_pair = nearest_pair(
+                                pairs, bodies, obstacles, field_values, field_origin, field_spacing,
+                                placed, obstacle_frames, angle, n_common, len(pairs), common_mm,
+                            )  # fmt: skip
+                            pair = own_pair if own_pair >= 0 else common_pair
                     rated *= clearance_factor(value, clearance_mm)
                     if rated <= DEFAULT_EPSILON:
                         rated, reason = 0.0, FIRST_PAIR + pair

@@ -52,7 +52,7 @@ def coloured(configuration_map: ConfigurationMap) -> tuple[FloatArray, list[Lege
     assert isinstance(texts, Mapping)
     shares: dict[tuple[str, str], float] = {}
     for code, count, colour in _by_frequency(reasons):
-        image[reasons.T == code] = to_rgb(colour)
+        image[code == reasons.T] = to_rgb(colour)
         text = "other collisions" if colour == _OTHER_COLLISIONS else str(texts.get(code, f"reason {code}"))
         shares[text, colour] = shares.get((text, colour), 0.0) + count / reasons.size
     return image, [LegendEntry(text, colour, share) for (text, colour), share in shares.items()]

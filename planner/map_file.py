@@ -53,7 +53,7 @@ def save_maps(file: Path, maps: Mapping[Configuration, ConfigurationMap]) -> Non
     partial = file.with_name(f".{file.name}.{os.getpid()}.partial")
     try:
         with partial.open("wb") as stream:
-            np.savez_compressed(stream, **arrays)  # type: ignore[arg-type] - the stub takes a name for a keyword
+            np.savez_compressed(stream, allow_pickle=False, **arrays)
         partial.replace(file)
     finally:
         partial.unlink(missing_ok=True)
@@ -68,12 +68,7 @@ def load_maps(file: Path) -> dict[Configuration, ConfigurationMap]:
     arrays = _read(file)
     try:
         metadata = json.loads(str(arrays["metadata"]))
-        if metadata["format"] != _FORMAT:
-            raise KeyError(_FORMAT)
-        if metadata["format_version"] != _FORMAT_VERSION:
-            raise MapFileError(
-                f"{file}: its format version is {metadata['format_version']}; this program reads {_FORMAT_VERSION}"
-            )
+        _check_format(file, metadata)
         configurations = [Configuration.parse(name) for name in metadata["configurations"]]
         parts = zip(configurations, arrays["values"], arrays["reasons"], metadata["maps"], strict=True)
         return {
@@ -94,6 +89,15 @@ def _read(file: Path) -> dict[str, Any]:
         raise MapFileError(f"{file}: cannot be read ({error.strerror or error})") from error
     except (ValueError, EOFError, KeyError, AttributeError, TypeError, zipfile.BadZipFile, zlib.error) as error:
         raise MapFileError(f"{file}: is damaged, or not an npz file at all") from error
+
+
+def _check_format(file: Path, metadata: Mapping[str, Any]) -> None:
+    if metadata["format"] != _FORMAT:
+        raise KeyError("format")
+    if metadata["format_version"] != _FORMAT_VERSION:
+        raise MapFileError(
+            f"{file}: its format version is {metadata['format_version']}; this program reads {_FORMAT_VERSION}"
+        )
 
 
 def _with_codes(about: dict[str, Any]) -> dict[str, object]:

@@ -53,7 +53,7 @@ def plot_map(configuration_map: ConfigurationMap, file: Path) -> None:
 
 
 def plot_map_cylinder(configuration_map: ConfigurationMap, file: Path) -> None:
-    """Write the map rolled up, seen from two opposite sides, since the table turns without end; Fig. 6b of the paper."""
+    """Write the map rolled up and seen from two sides, since the table turns without end; Fig. 6b of the paper."""
     image, legend = coloured(configuration_map)
     rows = ceil(len(legend) / _LEGEND_COLUMNS)
     figure = Figure(figsize=(8.0, 6.6 + 0.22 * rows), dpi=_DPI, layout="constrained")
@@ -179,7 +179,8 @@ def _legend(figure: Figure, legend: list[LegendEntry]) -> None:
 def _save(figure: Figure, file: Path) -> None:
     partial = file.with_name(f".{file.name}.{os.getpid()}.partial")
     try:
-        FigureCanvasAgg(figure).print_png(partial, metadata={"Software": None})
+        FigureCanvasAgg(figure)
+        figure.savefig(partial, format="png", metadata={"Software": None})
         partial.replace(file)
     finally:
         partial.unlink(missing_ok=True)

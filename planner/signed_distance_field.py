@@ -69,7 +69,8 @@ def build_field(
     for start in range(0, len(values), _BLOCK_POINTS):
         index = np.arange(start, min(start + _BLOCK_POINTS, len(values)))
         points = origin + spacing_mm * np.stack(np.unravel_index(index, tuple(shape)), axis=1)
-        values[index] = -trimesh.proximity.signed_distance(mesh, points)  # trimesh counts inside as positive
+        # trimesh counts inside as positive.
+        values[index] = -trimesh.proximity.signed_distance(mesh, points)  # type: ignore[no-untyped-call]  # no types shipped
         if progress is not None:
             progress(int(index[-1]) + 1, len(values))
     return SignedDistanceField(values.reshape(tuple(shape)), origin, spacing_mm)
@@ -126,13 +127,13 @@ def look_up(
     nx, ny, nz = values.shape
     gx, gy, gz = (x - origin[0]) / spacing, (y - origin[1]) / spacing, (z - origin[2]) / spacing
     cx, cy, cz = min(max(gx, 0.0), nx - 1.0), min(max(gy, 0.0), ny - 1.0), min(max(gz, 0.0), nz - 1.0)
-    i, j, k = min(int(floor(cx)), nx - 2), min(int(floor(cy)), ny - 2), min(int(floor(cz)), nz - 2)
+    i, j, k = min(floor(cx), nx - 2), min(floor(cy), ny - 2), min(floor(cz), nz - 2)
     u, v, w = cx - i, cy - j, cz - k
     near = (1 - u) * (1 - v) * values[i, j, k] + u * (1 - v) * values[i + 1, j, k]
     near += (1 - u) * v * values[i, j + 1, k] + u * v * values[i + 1, j + 1, k]
     far = (1 - u) * (1 - v) * values[i, j, k + 1] + u * (1 - v) * values[i + 1, j, k + 1]
     far += (1 - u) * v * values[i, j + 1, k + 1] + u * v * values[i + 1, j + 1, k + 1]
-    inside = (1 - w) * near + w * far
+    inside = float((1 - w) * near + w * far)
     dx, dy, dz = (gx - cx) * spacing, (gy - cy) * spacing, (gz - cz) * spacing
     outside = dx * dx + dy * dy + dz * dz
     if outside == 0.0:
@@ -148,14 +149,18 @@ def field_distance(
     """Return a lower bound in mm of the least signed distance of the segment a-b from the mesh.
 
     It is never above the true distance and, where the segment runs within the grid, at most two spacings below.
-    Where the distance is `enough_mm` or more, the result is only known to be at least that. The walk along the segment strides as far as the distance
-    at hand allows: nothing nearer than the least one found can lie within the difference of the two.
+    Where the distance is `enough_mm` or more, the result is only known to be at least that. The walk along the
+    segment strides as far as the distance at hand allows: nothing nearer than the least one found can lie within
+    the difference of the two.
     """
     ux, uy, uz = bx - ax, by - ay, bz - az
     length = sqrt(ux * ux + uy * uy + uz * uz)
     shortest = _STEP * spacing
     # Half a cell's diagonal from the look-up, half a shortest stride from the walk.
     error = (0.5 * sqrt(3.0) + 0.5 * _STEP) * spacing
+    middle = look_up(values, origin, spacing, ax + 0.5 * ux, ay + 0.5 * uy, az + 0.5 * uz)
+    if middle - 0.5 * length - error >= enough_mm:
+        return middle - 0.5 * length - error
     least = enough_mm + error
     along = 0.0
     while True:

@@ -30,7 +30,7 @@ def box_distance(
     sign_x = 1.0 if x >= 0.0 else -1.0
     sign_y = 1.0 if y >= 0.0 else -1.0
     sign_z = 1.0 if z >= 0.0 else -1.0
-    deepest = max(qx, max(qy, qz))
+    deepest = max(qx, qy, qz)
     if deepest <= 0.0:
         if deepest == qx:
             return qx, sign_x, 0.0, 0.0

@@ -8,7 +8,7 @@ Each factor can be switched off, weighted by its exponent (gamma is that of Eq. 
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -143,10 +143,10 @@ class ValueFunction:
         default = cls()
         on = frozenset(name for name in FACTORS if table.choice(name, ("on", "off"), "on") == "on")
         gamma = table.numbers("gamma", 6, default.gamma)
-        numbers = [table.number(name, getattr(default, name)) for name in _NUMBERS]
+        numbers: dict[str, Any] = {name: table.number(name, getattr(default, name)) for name in _NUMBERS}
         table.finish()
         try:
-            return cls(on, gamma, *numbers)
+            return replace(default, factors=on, gamma=gamma, **numbers)
         except ValueError as error:
             raise ScanFileError(f"{table.file}: {error}") from error
 

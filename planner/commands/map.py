@@ -25,7 +25,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "map",
         help="compute and draw a scan's configuration map",
-        description="Rate every location of a scan at every table angle, and say why the arm cannot be where it cannot.",
+        description="Rate every location of a scan at every table angle, and say why where the arm cannot be.",
         epilog="example: python -m planner map mould --configuration LEFTY-ABOVE-NOFLIP --out build/mould",
     )
     parser.add_argument("scan", metavar="SCAN", help=f"a scan file, or one of {', '.join(shipped_scans())}")

@@ -185,7 +185,9 @@ def test_a_users_factor_multiplies_into_the_map_and_may_forbid() -> None:
     late = reasons_of(rated)[20:][plain.allowed[20:]]
     assert len(late) > 0
     assert (late == FIRST_USER_FACTOR).all()
-    assert rated.metadata["reasons"][FIRST_USER_FACTOR] == "excluded by late is worse"  # type: ignore[index] - metadata values are of any type
+    texts = rated.metadata["reasons"]
+    assert isinstance(texts, dict)
+    assert texts[FIRST_USER_FACTOR] == "excluded by late is worse"
     assert sum(len(poses.joints) for poses in seen) == plain.allowed.sum()
     assert max(poses.clearance_mm.max() for poses in seen) <= posed.value.comfortable_clearance_mm
 

@@ -31,7 +31,7 @@ def test_maps_come_back_as_they_were_saved(tmp_path: Path) -> None:
     for configuration, each in loaded.items():
         assert np.array_equal(each.values, maps[configuration].values)
         assert each.reasons is not None
-        assert np.array_equal(each.reasons, maps[configuration].reasons)
+        assert (each.reasons == maps[configuration].reasons).all()
         assert each.metadata == maps[configuration].metadata
         assert each.epsilon == maps[configuration].epsilon
 

@@ -21,7 +21,8 @@ ORACLES: dict[int, Callable[[], object]] = {
 
 
 def distance(kind: int, a: NDArray[np.float64], b: NDArray[np.float64], enough_mm: float = FAR) -> float:
-    return solid_distance(kind, *SIZES[kind], *map(float, (*a, *b)), enough_mm)
+    (ax, ay, az), (bx, by, bz) = (map(float, end) for end in (a, b))
+    return solid_distance(kind, *SIZES[kind], ax, ay, az, bx, by, bz, enough_mm)
 
 
 @pytest.mark.parametrize("kind", [BOX, CYLINDER, CAPSULE])

@@ -1,4 +1,5 @@
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -123,17 +124,18 @@ def test_a_factor_can_be_looked_at_on_its_own() -> None:
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"gamma": (0.2,) * 5},
-        {"gamma": (-1.0,) * 6},
-        {"wrist_weight": -1.0},
-        {"wrist_threshold_deg": 30.0},
-        {"minimum_clearance_mm": 30.0},
-        {"minimum_clearance_mm": float("nan")},
+        lambda: replace(DEFAULT, factors=frozenset({"elbow"})),
+        lambda: replace(DEFAULT, gamma=(0.2,) * 5),
+        lambda: replace(DEFAULT, gamma=(-1.0,) * 6),
+        lambda: replace(DEFAULT, wrist_weight=-1.0),
+        lambda: replace(DEFAULT, wrist_threshold_deg=30.0),
+        lambda: replace(DEFAULT, minimum_clearance_mm=30.0),
+        lambda: replace(DEFAULT, minimum_clearance_mm=float("nan")),
     ],
 )
-def test_a_value_function_that_cannot_be_meant_is_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match=r"exponents|wrist|clearance"):
-        replace(DEFAULT, **wrong)
+def test_a_value_function_that_cannot_be_meant_is_refused(wrong: Callable[[], ValueFunction]) -> None:
+    with pytest.raises(ValueError, match=r"factor|exponents|wrist|clearance"):
+        wrong()
 
 
 def table(text: str, tmp_path: Path) -> TomlTable:
