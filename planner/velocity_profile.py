@@ -1,0 +1,102 @@
+"""The trapezoidal velocity profile that the table's controller makes of P, S and A, in continuous time (section 2.1).
+
+The controller knows no plan. At any moment its reference takes the greatest speed that A, S and the distance left to
+brake allow, from the position and the speed that it has. From those rules the reference is known for all time to come,
+in closed form: a few stretches of constant acceleration.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+# Distances in degrees below this are rounding: the firmware's own unit is a hundred times coarser.
+_ROUNDING_DEG = 1e-9
+
+
+class ReferenceState(NamedTuple):
+    """Where the reference is, and how fast it moves."""
+
+    angle_deg: float
+    speed_deg_s: float
+
+
+class MotionCommand(NamedTuple):
+    """One motion of the table: `P` with the `S` and the `A` that it latches, the last two above 0."""
+
+    target_deg: float
+    speed_deg_s: float
+    acceleration_deg_s2: float
+
+
+class Stretch(NamedTuple):
+    """Constant acceleration for a while."""
+
+    duration_s: float
+    acceleration_deg_s2: float
+
+
+def move(state: ReferenceState, acceleration_deg_s2: float, duration_s: float) -> ReferenceState:
+    """Return the state after a time of constant acceleration: Eq. (3) and (4)."""
+    angle, speed = state
+    return ReferenceState(
+        angle + speed * duration_s + 0.5 * acceleration_deg_s2 * duration_s**2,
+        speed + acceleration_deg_s2 * duration_s,
+    )
+
+
+def stretches(state: ReferenceState, command: MotionCommand) -> Iterator[Stretch]:
+    """Yield what the reference does from the moment of a command until it stands at the target.
+
+    A target behind, or nearer than the way needed to brake: it brakes at A to zero, passes, and comes back. A lower
+    speed than the present one: it brakes at A to S.
+    """
+    target, top_speed, rate = command
+    distance, speed = target - state.angle_deg, state.speed_deg_s
+    forward = 1.0 if distance > 0.0 or (distance == 0.0 and speed < 0.0) else -1.0
+    distance, speed = forward * distance, forward * speed
+    if speed < 0.0:
+        yield Stretch(-speed / rate, forward * rate)
+        distance, speed = distance + _braking_deg(speed, rate), 0.0
+    passes_by_deg = _braking_deg(speed, rate) - distance
+    if passes_by_deg > _ROUNDING_DEG:
+        yield Stretch(speed / rate, -forward * rate)
+        forward, distance, speed = -forward, passes_by_deg, 0.0
+    if speed > top_speed:
+        yield Stretch((speed - top_speed) / rate, -forward * rate)
+        distance, speed = distance - _braking_deg(speed, rate) + _braking_deg(top_speed, rate), top_speed
+    peak = max(speed, min(top_speed, math.sqrt(rate * distance + 0.5 * speed**2)))
+    if peak > 0.0:
+        yield Stretch((peak - speed) / rate, forward * rate)
+        ways_of_ramps = 2.0 * _braking_deg(peak, rate) - _braking_deg(speed, rate)
+        yield Stretch(max(0.0, distance - ways_of_ramps) / peak, 0.0)
+        yield Stretch(peak / rate, -forward * rate)
+
+
+def advance(state: ReferenceState, command: MotionCommand, duration_s: float) -> ReferenceState:
+    """Return where the reference is `duration_s` after a command; once it stands, exactly at the target."""
+    left_s = duration_s
+    for stretch in stretches(state, command):
+        if left_s < stretch.duration_s:
+            return move(state, stretch.acceleration_deg_s2, left_s)
+        state = move(state, stretch.acceleration_deg_s2, stretch.duration_s)
+        left_s -= stretch.duration_s
+    return ReferenceState(command.target_deg, 0.0)
+
+
+def time_to_rest_s(state: ReferenceState, command: MotionCommand) -> float:
+    """Return how long the reference takes to stand at the target."""
+    return sum(stretch.duration_s for stretch in stretches(state, command))
+
+
+def way_to_rest_deg(state: ReferenceState, command: MotionCommand) -> tuple[float, float]:
+    """Return the lowest and the highest angle of the reference until it stands at the target."""
+    ends = [state.angle_deg, command.target_deg]
+    for stretch in stretches(state, command):
+        state = move(state, stretch.acceleration_deg_s2, stretch.duration_s)
+        ends.append(state.angle_deg)
+    return min(ends), max(ends)
+
+
+def _braking_deg(speed_deg_s: float, rate_deg_s2: float) -> float:
+    """Return the way from a speed to standstill."""
+    return 0.5 * speed_deg_s**2 / rate_deg_s2
