@@ -69,7 +69,7 @@ def test_a_tick_is_what_a_stiff_solver_integrates(
         rates, (0.0, motor["tick_s"]), [current_A, speed_rad_s, 0.0], method="LSODA", rtol=1e-10, atol=1e-12
     )
     scale = np.abs(solved.y).max(axis=1)
-    assert step_matrix(motor) @ start == pytest.approx(solved.y[:, -1], abs=1e-6 * float(scale.max()), rel=1e-6)
+    assert step_matrix(motor) @ start == pytest.approx(solved.y[:, -1], abs=1e-9 + 1e-6 * float(scale.max()), rel=1e-6)
 
 
 @settings(max_examples=200, deadline=None)
