@@ -61,7 +61,7 @@ def dijkstra(problem: Problem, cells: Cells | None = None) -> Outcome:
     obstacle = obvious_obstacle(problem, NAME)
     if obstacle is not None:
         return obstacle
-    path = lattice_path(problem, cells or Cells(problem.map.angle_count))
+    path = lattice_path(problem, cells or Cells())
     if path is None:
         return NoPlan(NAME, Obstacle.UNREACHABLE)
     start_deg = path.angles_deg[0] if problem.start_angle_deg is None else problem.start_angle_deg

@@ -25,12 +25,13 @@ from planner.dynamic_programming import dynamic_programming
 from planner.local_maxima import local_maxima
 from planner.motion import Limits, limited_acceleration, next_angle, next_speed
 from planner.plan import Outcome, Plan
+from planner.plan_plots import CURVE_COLOUR, PLAN_COLOUR, draw_motion, draw_wrapped
 from planner.problem import Problem
 from planner.ray_shooting import Rays, cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
 from planner.synthetic_maps import MapFamily, blocks_map, synthetic_map
 from planner.value import joint_factor
 
-PLAN_COLOUR, RAY_COLOUR, OTHER_COLOUR = "#d62728", "#7fb2e5", "#1f77b4"
+RAY_COLOUR = "#7fb2e5"
 
 # The joint whose factor Fig. 5 shows: joint 1 of the arm.
 JOINT_RANGE_DEG = (-170.0, 170.0)
@@ -89,7 +90,7 @@ def figure_6() -> Figure:
     figure = Figure(figsize=(11.0, 4.8), layout="constrained")
     flat = figure.add_subplot(1, 2, 1)
     image = _draw_map(flat, problem.map)
-    _draw_path(flat, plan.angles_deg)
+    draw_wrapped(flat, plan.angles_deg)
     flat.set_title("(a) 2D view")
     figure.colorbar(image, ax=flat, label="$f_R$", shrink=0.85)
     round_view = figure.add_subplot(1, 2, 2, projection="3d")
@@ -118,8 +119,8 @@ def figure_8() -> Figure:
     for axes, label, moment in zip(figure.subplots(2, 2, sharex=True, sharey=True).flat, titles, MOMENTS, strict=True):
         _draw_map(axes, problem.map)
         _draw_rays(axes, problem, plan, moment)
-        axes.plot(plan.angles_deg[: moment + 1], color=OTHER_COLOUR, linewidth=2.2, label="planned so far")
-        axes.plot(moment, plan.angles_deg[moment], "o", color=OTHER_COLOUR, markersize=6)
+        axes.plot(plan.angles_deg[: moment + 1], color=CURVE_COLOUR, linewidth=2.2, label="planned so far")
+        axes.plot(moment, plan.angles_deg[moment], "o", color=CURVE_COLOUR, markersize=6)
         axes.set_title(label, fontsize=10)
         axes.label_outer()
     figure.axes[0].legend(loc="lower left", fontsize=8, framealpha=0.9)
@@ -138,22 +139,11 @@ def _motion_figure(outcome: Outcome, title: str) -> Figure:
     _draw_map(on_map, problem.map)
     brightest = _plan(local_maxima(problem)).angles_deg
     on_map.plot(brightest % 360.0, ".", color="#e7a33e", markersize=3, label="local maxima")
-    _draw_path(on_map, plan.angles_deg)
+    draw_wrapped(on_map, plan.angles_deg)
     on_map.plot([], [], color=PLAN_COLOUR, label="plan")
     on_map.legend(loc="upper right", fontsize=8)
     on_map.set(xlabel="", title=f"{title}: cost {plan.cost.total:.1f}")
-    locations = np.arange(len(plan.angles_deg))
-    speed.plot(locations, plan.speeds_deg_s, color=OTHER_COLOUR)
-    speed.set_ylabel("speed (deg/s)")
-    acceleration.stairs(plan.accelerations_deg_s2, locations, color=OTHER_COLOUR, baseline=None)
-    acceleration.set(ylabel="acceleration (deg/s$^2$)", xlabel="scan location")
-    for axes, limit in ((speed, problem.limits.speed_deg_s), (acceleration, problem.limits.acceleration_deg_s2)):
-        axes.set_ylim(-1.1 * limit, 1.1 * limit)
-        for bound in (-limit, limit):
-            axes.axhline(bound, color="#888888", linestyle="--", linewidth=0.8)
-        axes.grid(visible=True, alpha=0.3)
-        for pause in plan.pauses:
-            axes.axvline(pause.step + 0.5, color="#e7a33e", linewidth=1.0)
+    draw_motion(speed, acceleration, problem, plan)
     return figure
 
 
@@ -170,15 +160,6 @@ def _draw_map(axes: Axes, configuration_map: ConfigurationMap) -> AxesImage:
     )
     axes.set(xlabel="scan location", ylabel="table angle (deg)", yticks=range(0, 361, 60))
     return image
-
-
-def _draw_path(axes: Axes, angles_deg: FloatArray) -> None:
-    """Draw a path wrapped to one turn, interrupted where it passes 0."""
-    turn = np.floor(angles_deg / 360.0)
-    for value in np.unique(turn):
-        inside = np.where((turn == value) | (np.roll(turn, 1) == value), angles_deg - 360.0 * value, np.nan)
-        axes.plot(inside, color=PLAN_COLOUR, linewidth=2.0)
-    axes.set_ylim(0.0, 360.0 - 1e-9)
 
 
 def _draw_cylinder(axes: Axes3D, configuration_map: ConfigurationMap, angles_deg: FloatArray) -> None:

@@ -33,13 +33,14 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--configuration", metavar="NAME", default="all", help="such as LEFTY-ABOVE-NOFLIP, or all (the default)"
     )
     parser.add_argument(
-        "--angles", type=_angle_count, default=360, metavar="COUNT", help="table angles over one turn (default 360)"
+        "--angles", type=angle_count, default=360, metavar="COUNT", help="table angles over one turn (default 360)"
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the map and its pictures")
     parser.set_defaults(run=run)
 
 
-def _angle_count(text: str) -> int:
+def angle_count(text: str) -> int:
+    """Return the number of table angles that an option asks for."""
     try:
         count = int(text)
     except ValueError:

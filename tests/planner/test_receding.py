@@ -67,7 +67,7 @@ def test_a_wall_takes_one_pause_that_ends_where_the_way_on_is_open() -> None:
     problem = Problem(ConfigurationMap(values), start_angle_deg=180.0)
     plan = receding(problem, columns_in_view=25)
     assert isinstance(plan, Plan)
-    assert [pause.step for pause in plan.pauses] == [9] or len(plan.pauses) == 1
+    assert len(plan.pauses) == 1
     assert not is_forbidden_on_the_way(problem.map, plan)
     assert plan.cost.pauses == problem.terms.pause_cost
 

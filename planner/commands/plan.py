@@ -1,0 +1,169 @@
+"""`python -m planner plan`: choose the table's motion along a scan, write it down, and say how good it is."""
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from planner.arm_motion import arm_motion
+from planner.best_configuration import best_configuration
+from planner.commands.map import angle_count
+from planner.config_map import ConfigurationMap
+from planner.configuration import Configuration
+from planner.cost import Weights
+from planner.errors import PlannerError
+from planner.joint_path import JointPath
+from planner.map_builder import build_maps
+from planner.map_problem import map_problem
+from planner.motion import Limits
+from planner.plan import NoPlan, Outcome, Plan
+from planner.plan_file import plan_document, save_plan
+from planner.plan_plots import plot_plan
+from planner.planners import DEFAULT_PLANNER, PLANNERS, Planner
+from planner.problem import Problem
+from planner.progress import progress_line
+from planner.reasons import Reason
+from planner.scan import Scan, load_scan, shipped_scans
+from planner.verification import verify
+
+_NO_PLAN = 1
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command to `python -m planner`."""
+    parser = commands.add_parser(
+        "plan",
+        help="plan the table's motion along a scan",
+        description="Choose the table's motion across a scan's configuration map; exit status 1 where there is none.",
+        epilog="example: python -m planner plan mould --compare --out build/mould",
+    )
+    parser.add_argument("scan", metavar="SCAN", help=f"a scan file, or one of {', '.join(shipped_scans())}")
+    parser.add_argument(
+        "--planner", choices=list(PLANNERS), default=DEFAULT_PLANNER, help=f"default: {DEFAULT_PLANNER}"
+    )
+    parser.add_argument(
+        "--configuration", metavar="NAME", default="best", help="such as LEFTY-ABOVE-NOFLIP, or best (the default)"
+    )
+    parser.add_argument("--start", type=_angle, metavar="DEG", help="table angle at the first location (default: free)")
+    parser.add_argument(
+        "--angles", type=angle_count, default=360, metavar="COUNT", help="table angles over one turn (default 360)"
+    )
+    parser.add_argument("--compare", action="store_true", help="run all planners and print a table of them")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for plan.json and plan.png")
+    parser.set_defaults(run=run)
+
+
+def _angle(text: str) -> float:
+    try:
+        angle = float(text)
+    except ValueError:
+        angle = math.nan
+    if not math.isfinite(angle):
+        raise argparse.ArgumentTypeError(f"is {text}; allowed is any angle in degrees")
+    return angle
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write `plan.json` and `plan.png`, print cost, time and margins, and return the exit status."""
+    best = arguments.configuration == "best"
+    asked = list(Configuration) if best else [Configuration.parse(arguments.configuration)]
+    scan = load_scan(arguments.scan)
+    problem = map_problem(scan, progress_line("distance field", sys.stderr))
+    maps = build_maps(problem, asked, arguments.angles, progress_line("map", sys.stderr))
+    problems = {configuration.label: problem_of(scan, each, arguments.start) for configuration, each in maps.items()}
+    comparison = best_configuration(problems, timed(PLANNERS[arguments.planner]))
+    for label, outcome in comparison.outcomes.items():
+        sys.stderr.write(configuration_line(label, outcome))
+    if comparison.best is None:
+        sys.stdout.write(f"{scan.name}: there is no plan\n")
+        return _NO_PLAN
+    chosen, plan = problems[comparison.best], comparison.outcomes[comparison.best]
+    assert isinstance(plan, Plan)
+    joints = arm_motion(scan, Configuration.parse(comparison.best), plan)
+    _write(arguments.out, scan, chosen, plan, joints)
+    sys.stdout.write(report(scan, chosen, plan, joints))
+    if arguments.compare:
+        start = replace(chosen, start_angle_deg=float(plan.angles_deg[0]))
+        sys.stdout.write(comparison_table(start, {name: timed(planner)(start) for name, planner in PLANNERS.items()}))
+    return 0 if joints.step is None and verify(chosen, plan).is_executable else _NO_PLAN
+
+
+def problem_of(scan: Scan, configuration_map: ConfigurationMap, start_angle_deg: float | None) -> Problem:
+    """Return the planning problem of a scan in one configuration, from rest."""
+    return Problem(
+        configuration_map,
+        scan.path.step_s,
+        Limits(scan.limits.speed_deg_s, scan.limits.acceleration_deg_s2),
+        Weights(scan.weights.k_a, scan.weights.k_w),
+        start_angle_deg,
+    )
+
+
+def timed(planner: Planner) -> Planner:
+    """Return the planner with its plans' computing time filled in; the first call, which may compile, is left out."""
+
+    def plan(problem: Problem) -> Outcome:
+        planner(problem)
+        before = time.perf_counter()
+        outcome = planner(problem)
+        seconds = time.perf_counter() - before
+        return replace(outcome, computing_time_s=seconds) if isinstance(outcome, Plan) else outcome
+
+    return plan
+
+
+def configuration_line(label: str, outcome: Outcome) -> str:
+    """Return what came out for one arm configuration."""
+    return f"{label:20} {outcome.reason if isinstance(outcome, NoPlan) else f'cost {outcome.cost.total:.3f}'}\n"
+
+
+def report(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -> str:
+    """Return cost, time and margins of a plan, for people."""
+    checked, cost = verify(problem, plan), plan.cost
+    lines = [
+        f"{scan.name}: {plan.planner}, {plan.configuration}, {problem.map.location_count} locations, "
+        f"{problem.step_count * problem.step_s:g} s",
+        f"cost          {cost.total:.4f} = acceleration {cost.acceleration:.4f} + speed {cost.speed:.4f} "
+        f"+ value {cost.value:.4f} + pauses {cost.pauses:.4f}",
+        f"pauses        {len(plan.pauses)}",
+        f"planned in    {1e3 * (plan.computing_time_s or 0.0):.2f} ms",
+        f"margins       {checked.clearance_deg:.2f} deg to the nearest forbidden cell, "
+        f"{checked.speed_margin_deg_s:.2f} deg/s to the speed limit, "
+        f"{checked.acceleration_margin_deg_s2:.2f} deg/s^2 to the acceleration limit",
+        f"arm           {_arm_verdict(joints)}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _arm_verdict(joints: JointPath) -> str:
+    if joints.step is None:
+        return "follows within joint limits and joint speeds"
+    return f"cannot follow at location {joints.step}: {Reason(joints.reason).name.lower().replace('_', ' ')}"
+
+
+def comparison_table(problem: Problem, outcomes: Mapping[str, Outcome]) -> str:
+    """Return a line for each planner: cost, violations, pauses and time, all from the same start."""
+    lines = [f"{'planner':20} {'cost':>10} {'forbidden steps':>15} {'within limits':>13} {'pauses':>6} {'ms':>9}"]
+    for name, outcome in outcomes.items():
+        if isinstance(outcome, NoPlan):
+            lines.append(f"{name:20} {outcome.reason}")
+            continue
+        checked = verify(problem, outcome)
+        lines.append(
+            f"{name:20} {outcome.cost.total:10.4f} {len(checked.forbidden_steps):15d} "
+            f"{'yes' if checked.within_limits else 'no':>13} {len(outcome.pauses):6d} "
+            f"{1e3 * (outcome.computing_time_s or 0.0):9.2f}"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _write(out: Path, scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        save_plan(out / "plan.json", plan_document(scan, problem, plan, joints))
+        plot_plan(problem, plan, f"{scan.name}   {plan.configuration}   {plan.planner}", out / "plan.png")
+    except OSError as error:
+        raise PlannerError(f"{out}: the plan cannot be written there ({error.strerror or error})") from error
