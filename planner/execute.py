@@ -1,0 +1,359 @@
+"""Run a motion on the table that a port leads to: send each command in time, read, correct, and stop when it goes wrong.
+
+One code path for a pty, TCP, a serial device and simulated time: the clock comes from the port. Between two motion
+commands the position is polled (H) and, at each scan location, the latch is read (L); neither delays a command. The
+record of what was sent and seen is complete whatever happens.
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from planner.inside_view import InsideView, Look
+from planner.motion import Limits
+from planner.stream import LATEST_S, TimedCommand, Wire, check_it_fits, command_line, exchanges_s, stream
+from planner.table_motion import Phase, TableMotion
+from planner.velocity_profile import MotionCommand, ReferenceState, advance, time_to_rest_s
+from protocol import CommandRefused, TableClient, TableError, Verb
+
+# What the bytes of H and of its answer come to.
+_READING_BYTES = 12
+# Between the last poll and the next command: what the operating system may take.
+_SLACK_S = 0.005
+
+
+class ExecutionError(TableError):
+    """The table did not do what the plan asks."""
+
+
+class Settings(NamedTuple):
+    """How a motion is run.
+
+    Attributes:
+        lag_s: how long after the reference the encoder is at the same angle; the default is that of the stand-in's speed
+            loop.
+        lead_s: how long before their time the commands take effect. With the lag, the encoder is in time; with 0, the
+            reference is.
+        tolerance_deg: how far the encoder may be from the plan before the table is stopped.
+        drift_deg: how far the reference may be from where it was expected before the rest is streamed anew.
+        drift_filter_s: over how long readings are averaged for that.
+        poll_s: from one reading of the position to the next, at least.
+        look_s: the same for looks from inside.
+    """
+
+    lag_s: float = 0.0096
+    lead_s: float = 0.0096
+    tolerance_deg: float = 1.0
+    drift_deg: float = 0.1
+    drift_filter_s: float = 3.0
+    poll_s: float = 0.05
+    look_s: float = 0.02
+
+
+class Sent(NamedTuple):
+    """A motion command as it was sent; times in s of the motion, `late_s` against its schedule."""
+
+    time_s: float
+    late_s: float
+    phase: Phase
+    column: int
+    command: MotionCommand
+
+
+class Observation(NamedTuple):
+    """Where the table was seen, in degrees.
+
+    Attributes:
+        time_s: when, in the time of the motion.
+        source: "H", "L", or "inside" for a look that a stand-in allowed.
+        encoder_deg: the encoder, as `source` tells it.
+        column: the scan location whose trigger this belongs to.
+        reference_deg: the controller's reference, where it was told.
+        true_deg: the table's own angle, where it was told.
+    """
+
+    time_s: float
+    source: str
+    encoder_deg: float
+    column: int | None = None
+    reference_deg: float | None = None
+    true_deg: float | None = None
+
+
+class Correction(NamedTuple):
+    """From `time_s` on the stream was computed anew, for a reference that was `drift_deg` ahead of what was expected."""
+
+    time_s: float
+    drift_deg: float
+
+
+@dataclass
+class Record:
+    """What was sent and seen; it grows while the motion runs.
+
+    Attributes:
+        sent: the motion commands.
+        observations: where the table was seen.
+        corrections: where the stream was changed for drift.
+        failure: why the motion was stopped; None when it came to its end.
+    """
+
+    sent: list[Sent] = field(default_factory=list)
+    observations: list[Observation] = field(default_factory=list)
+    corrections: list[Correction] = field(default_factory=list)
+    failure: str | None = None
+
+
+def execute(
+    table: TableClient,
+    motion: TableMotion,
+    limits: Limits,
+    wire: Wire,
+    settings: Settings | None = None,
+    view: InsideView | None = None,
+    progress: Callable[[float, float], None] | None = None,
+) -> Record:
+    """Run a motion on a table that stands at its start, and return what happened.
+
+    Whatever goes wrong, and Ctrl-C, stops the table and is named in the record.
+
+    Args:
+        table: the client at the table's port.
+        motion: what the table should do.
+        limits: greatest S and A.
+        wire: what its commands have to pass.
+        settings: how it is run.
+        view: a way to look into the table, where there is one; then it also gets its triggers from here.
+        progress: called with the time of the motion and its end.
+
+    Raises:
+        StreamError: the commands follow one another faster than the wire carries them; nothing was sent.
+    """
+    commands = stream(motion, limits, wire)
+    check_it_fits(commands, wire)
+    run = _Run(table, motion, limits, wire, settings or Settings(), view, progress)
+    try:
+        run.go(commands)
+    except TableError as error:
+        run.record.failure = str(error)
+    except KeyboardInterrupt:
+        run.record.failure = "interrupted"
+    if run.record.failure is not None:
+        with suppress(TableError):
+            table.stop()
+    return run.record
+
+
+def bring_to(table: TableClient, angle_deg: float, limits: Limits, wire: Wire, tolerance_deg: float = 0.1) -> None:
+    """Move the table to an angle at the limits, unless it stands there, and wait until it does.
+
+    Raises:
+        TableError: the table did not get there; it was stopped.
+    """
+    position_deg = table.position_deg()
+    try:
+        table.set_speed(_floor(limits.speed_deg_s, wire))
+        table.set_acceleration(_floor(limits.acceleration_deg_s2, wire))
+    except CommandRefused as error:
+        raise ExecutionError(
+            f"this table refuses the plan's limits, {limits.speed_deg_s:g} deg/s and"
+            f" {limits.acceleration_deg_s2:g} deg/s2; plan within this table's own limits"
+        ) from error
+    if abs(position_deg - angle_deg) <= tolerance_deg:
+        return
+    way = MotionCommand(angle_deg, *limits)
+    try:
+        table.move_to(angle_deg)
+        needed_s = time_to_rest_s(ReferenceState(position_deg, 0.0), way)
+        table.wait_until_at(angle_deg, tolerance_deg, 2.0 * needed_s + 3.0)
+    except (TableError, KeyboardInterrupt):
+        with suppress(TableError):
+            table.stop()
+        raise
+
+
+def _floor(limit: float, wire: Wire) -> float:
+    return int(limit / wire.quantum + 1e-6) * wire.quantum
+
+
+class _Run:
+    """One motion under way. Times are those of the motion; `_origin_s` is its 0 on the client's clock."""
+
+    def __init__(
+        self,
+        table: TableClient,
+        motion: TableMotion,
+        limits: Limits,
+        wire: Wire,
+        settings: Settings,
+        view: InsideView | None,
+        progress: Callable[[float, float], None] | None,
+    ) -> None:
+        self.record = Record()
+        self._table, self._motion, self._limits, self._wire = table, motion, limits, wire
+        self._settings, self._view, self._progress = settings, view, progress
+        self._pending_columns = list(enumerate(motion.column_times_s))
+        self._drift = _Drift(settings.drift_filter_s)
+        self._latched: MotionCommand | None = None
+        self._running: TimedCommand | None = None
+        self._next_poll_s = self._next_look_s = motion.start_s
+        # The first command's S and A are to be sent in peace.
+        self._origin_s = table.clock.now_s() - motion.start_s + settings.lead_s + 4.0 * exchanges_s(wire, _ANY) + 0.1
+
+    def go(self, commands: Sequence[TimedCommand]) -> None:
+        """Send all commands in their time, then wait until the table stands."""
+        for number in range(len(commands)):
+            commands = self._corrected(commands, number)
+            self._send(commands[number])
+            following = commands[number + 1] if number + 1 < len(commands) else None
+            until_s = self._motion.end_s if following is None else self._prepare_s(following)
+            self._observe(until_s)
+        end_deg = self._running.command.target_deg if self._running else self._motion.start_deg
+        position_deg = self._table.wait_until_at(end_deg, self._settings.tolerance_deg, timeout_s=2.0)
+        self._see(Observation(self._now_s(), "H", position_deg))
+
+    def _corrected(self, commands: Sequence[TimedCommand], number: int) -> Sequence[TimedCommand]:
+        """Return the commands, computed anew from `number` on if the reference is not where it was expected."""
+        drift_deg = self._drift.estimate_deg
+        if abs(drift_deg) <= self._settings.drift_deg or self._running is None:
+            return commands
+        expected = commands[number].expected
+        start = ReferenceState(expected.angle_deg + drift_deg, expected.speed_deg_s)
+        self._drift.forget()
+        self.record.corrections.append(Correction(commands[number].time_s, drift_deg))
+        return (*commands[:number], *stream(self._motion, self._limits, self._wire, number, start))
+
+    def _send(self, timed: TimedCommand) -> None:
+        """Send A and S where they change, and P so that its CR arrives in time."""
+        command, before = timed.command, self._latched
+        if before is None or command.acceleration_deg_s2 != before.acceleration_deg_s2:
+            self._table.set_acceleration(command.acceleration_deg_s2)
+        if before is None or command.speed_deg_s != before.speed_deg_s:
+            self._table.set_speed(command.speed_deg_s)
+        self._latched = command
+        due_s = timed.time_s - self._settings.lead_s - self._wire.seconds(self._target_bytes(command))
+        self._sleep_until(due_s)
+        late_s = self._now_s() - due_s
+        if late_s > LATEST_S:
+            raise ExecutionError(
+                f"the command of location {timed.leg.column} would have come {late_s:.2f} s late, more than {LATEST_S:g} s:"
+                " the table or this machine answers too slowly"
+            )
+        self._table.move_to(command.target_deg)
+        self._running = timed
+        self.record.sent.append(Sent(timed.time_s, late_s, timed.leg.phase, timed.leg.column, command))
+
+    def _prepare_s(self, timed: TimedCommand) -> float:
+        """Return when the lines of a command have to begin."""
+        return timed.time_s - self._settings.lead_s - exchanges_s(self._wire, timed.command, self._latched) - _SLACK_S
+
+    def _target_bytes(self, command: MotionCommand) -> int:
+        return len(command_line(Verb.MOVE_TO, command.target_deg, self._wire))
+
+    def _observe(self, until_s: float) -> None:
+        """Read latch and position, as often as there is time for it; then sleep."""
+        reading_s = self._wire.seconds(_READING_BYTES) + self._wire.turnaround_s
+        while True:
+            column_s = float(self._pending_columns[0][1]) if self._pending_columns else float("inf")
+            poll_s = max(self._now_s(), self._next_poll_s)
+            is_trigger = poll_s + reading_s > column_s
+            begin_s = column_s if is_trigger else poll_s
+            if begin_s + reading_s > until_s:
+                break
+            self._sleep_until(begin_s)
+            if is_trigger:
+                self._latch()
+            else:
+                self._poll()
+        self._sleep_until(until_s)
+
+    def _latch(self) -> None:
+        """Pull the trigger where it is ours to pull, and read the latch."""
+        column, _ = self._pending_columns.pop(0)
+        time_s = self._now_s()
+        look = None
+        if self._view is not None:
+            look = self._view.look()
+            self._view.trigger()
+        latched_deg = self._table.latched_deg()
+        self._see(
+            Observation(
+                time_s,
+                "L",
+                latched_deg,
+                column,
+                look.reference_deg if look else None,
+                look.true_deg if look else None,
+            )
+        )
+
+    def _poll(self) -> None:
+        """Read the position, and stop the run where it is not that of the plan."""
+        self._next_poll_s = self._now_s() + self._settings.poll_s
+        time_s = self._now_s() + self._wire.seconds(2)
+        position_deg = self._table.position_deg()
+        self._see(Observation(time_s, "H", position_deg))
+        planned_deg = self._motion.state_at(time_s).angle_deg
+        if abs(position_deg - planned_deg) > self._settings.tolerance_deg:
+            raise ExecutionError(
+                f"at {time_s:.2f} s the table is at {position_deg:.1f} deg and should be at {planned_deg:.1f}: more than"
+                f" {self._settings.tolerance_deg:g} deg off, it was stopped; does it turn freely?"
+            )
+        # Where the reference was when the table's lag began; what it did before the command that runs is of no interest.
+        assert self._running is not None
+        since_s = time_s + self._settings.lead_s - self._settings.lag_s - self._running.time_s
+        if since_s >= 0.0:
+            expected = advance(self._running.expected, self._running.command, since_s)
+            self._drift.take(time_s, position_deg - expected.angle_deg)
+
+    def _see(self, observation: Observation) -> None:
+        self.record.observations.append(observation)
+        if self._progress is not None:
+            self._progress(observation.time_s, self._motion.end_s)
+
+    def _look(self) -> None:
+        assert self._view is not None
+        look: Look = self._view.look()
+        self.record.observations.append(
+            Observation(self._now_s(), "inside", look.encoder_deg, None, look.reference_deg, look.true_deg)
+        )
+        self._next_look_s = self._now_s() + self._settings.look_s
+
+    def _now_s(self) -> float:
+        return self._table.clock.now_s() - self._origin_s
+
+    def _sleep_until(self, time_s: float) -> None:
+        """Sleep, and look inside meanwhile where that is possible."""
+        while (left_s := time_s - self._now_s()) > 0.0:
+            if self._view is None:
+                self._table.clock.sleep_s(left_s)
+                continue
+            look_in_s = self._next_look_s - self._now_s()
+            if look_in_s <= 0.0:
+                self._look()
+            else:
+                self._table.clock.sleep_s(min(left_s, look_in_s))
+
+
+_ANY = MotionCommand(-100.0, 10.0, 10.0)
+
+
+class _Drift:
+    """The mean of what the readings differ from what was expected, the latest counting most."""
+
+    def __init__(self, filter_s: float) -> None:
+        self._filter_s = filter_s
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self.estimate_deg = 0.0
+        self._last_s: float | None = None
+
+    def take(self, time_s: float, difference_deg: float) -> None:
+        """Take in one difference."""
+        if self._last_s is not None:
+            share = min(1.0, (time_s - self._last_s) / self._filter_s)
+            self.estimate_deg += share * (difference_deg - self.estimate_deg)
+        self._last_s = time_s
