@@ -25,8 +25,8 @@ from planner.transforms import rotations_z
 IndexArray = npt.NDArray[np.int64]
 
 _FIXED_LINK = 0
+_WRIST_FRAMES = (4, 5)
 _BEAM = "beam"
-
 
 # The columns of the bodies' table: the frame that a body moves with, its ends there in mm, its radius in mm.
 _FRAME, _START, _END, _RADIUS = 0, 1, 4, 7
@@ -78,8 +78,10 @@ def collision_model(
     """Return the model and the name of each of its pairs, such as "probe and table".
 
     Raises:
-        ValueError: More than one obstacle is a field.
+        ValueError: More than one obstacle is a field, or a part turns with joint 4 or 5.
     """
+    if any(part.frame in _WRIST_FRAMES for part in bodies.parts):
+        raise ValueError("a part moves with frame 4 or 5; both flips of the wrist must put every part in one place")
     fields = [obstacle.field for obstacle in obstacles if obstacle.field is not None]
     if len(fields) > 1:
         raise ValueError(f"{len(fields)} obstacles are meshes, the collision model takes one")
@@ -136,7 +138,12 @@ def clearances(
         joints: `(n, 6)`, in radians.
         table_angles_deg: `(n,)`.
         stand_off_mm: The probe's distance from the surface along its beam.
+
+    Raises:
+        ValueError: A joint or an angle is not a finite number.
     """
+    if not (np.isfinite(joints).all() and np.isfinite(table_angles_deg).all()):
+        raise ValueError("a joint or a table angle is not a finite number; only reached poses have a clearance")
     clearance_mm, pair = np.empty(len(joints)), np.empty(len(joints), dtype=np.int64)
     _clearance_of_each(
         arm.table,
@@ -196,12 +203,12 @@ def nearest_pair(
     Clearances of `enough_mm` or more are of no interest: if there is nothing below, that and -1 are returned.
 
     Args:
-        pairs: See `CollisionModel`, as bodies, obstacles and the field's three.
-        bodies: ...
-        obstacles: ...
-        field_values: ...
-        field_origin: ...
-        field_spacing: ...
+        pairs: See `CollisionModel`.
+        bodies: See `CollisionModel`.
+        obstacles: See `CollisionModel`.
+        field_values: The model's field.
+        field_origin: Its origin.
+        field_spacing: Its spacing.
         placed: `(n_bodies, 6)`, see `place_bodies`.
         obstacle_frames: `(n_angles, n_obstacles, 3, 4)`, see `base_in_obstacles`.
         angle: Which of the table angles.

@@ -61,13 +61,16 @@ def build_maps(
         progress: Called with the locations done and all of them, between blocks; what it raises ends the work.
 
     Raises:
-        ValueError: A user's factor gave a wrong shape, or something else than numbers in 0..1.
+        ValueError: A user's factor gave a wrong shape, or something else than numbers in 0..1; or there are more user
+            factors or pairs than a map can tell apart.
     """
+    user_factors = problem.value.user_factors
+    user_names = [factor.name for factor in user_factors]
+    texts = reason_texts(problem.pair_names, user_names)
     n_locations = len(problem.T_WS)
     shape = (len(configurations), n_locations, n_angles)
     values, reasons = np.empty(shape), np.empty(shape, dtype=np.uint8)
     cells = _cells(problem, configurations, n_angles)
-    user_factors = problem.value.user_factors
     block = max(1, _BLOCK_CELLS // n_angles)
     for first in range(0, n_locations, block):
         last = min(first + block, n_locations)
@@ -78,11 +81,7 @@ def build_maps(
             _rate_columns(*cells, first, *window, *_NO_POSES)
         if progress is not None:
             progress(last, n_locations)
-    metadata = {
-        "scan": problem.name,
-        "digest": _digest(cells, [factor.name for factor in user_factors]),
-        "reasons": reason_texts(problem.pair_names, [factor.name for factor in user_factors]),
-    }
+    metadata = {"scan": problem.name, "digest": _digest(cells, user_names), "reasons": texts}
     return {
         configuration: ConfigurationMap(
             values[c], reasons[c], metadata=metadata | {"configuration": configuration.label}
@@ -191,7 +190,7 @@ def _rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between 
             inverse(arm, flange, joints, codes)
             # What the flange carries is as far from the cell in all configurations; found when first asked for.
             common_mm, common_pair = comfortable_mm, -1
-            # No body turns with joints 4 and 5, so FLIP and NOFLIP have the same clearance.
+            # No part turns with joint 4 or 5, so FLIP and NOFLIP have the same clearance.
             clearance_mm, pair, known_arm = comfortable_mm, -1, -1
             for c in range(len(slots)):
                 slot = slots[c]

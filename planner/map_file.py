@@ -5,7 +5,6 @@ maps give the same bytes.
 """
 
 import json
-import os
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -18,6 +17,7 @@ import numpy as np
 from planner.config_map import ConfigurationMap, ConfigurationMapError
 from planner.configuration import Configuration
 from planner.errors import PlannerError
+from planner.whole_file import whole_file
 
 _FORMAT = "seventh-axis configuration maps"
 _FORMAT_VERSION = 1
@@ -50,13 +50,8 @@ def save_maps(file: Path, maps: Mapping[Configuration, ConfigurationMap]) -> Non
         "reasons": np.stack([_reasons(each) for each in stored]),
         "metadata": np.array(json.dumps(metadata, sort_keys=True)),
     }
-    partial = file.with_name(f".{file.name}.{os.getpid()}.partial")
-    try:
-        with partial.open("wb") as stream:
-            np.savez_compressed(stream, allow_pickle=False, **arrays)
-        partial.replace(file)
-    finally:
-        partial.unlink(missing_ok=True)
+    with whole_file(file) as partial:
+        np.savez_compressed(partial, allow_pickle=False, **arrays)
 
 
 def load_maps(file: Path) -> dict[Configuration, ConfigurationMap]:

@@ -1,6 +1,5 @@
 """Pictures of a configuration map: flat (Fig. 6a) and rolled up into a tube (Fig. 6b). The same map, the same bytes."""
 
-import os
 from math import ceil
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from planner.arrays import FloatArray
 from planner.config_map import ConfigurationMap
 from planner.map_colours import DARKEST_GRAY, LegendEntry, coloured
+from planner.whole_file import whole_file
 
 _DPI = 120
 _LEGEND_COLUMNS = 3
@@ -177,10 +177,7 @@ def _legend(figure: Figure, legend: list[LegendEntry]) -> None:
 
 
 def _save(figure: Figure, file: Path) -> None:
-    partial = file.with_name(f".{file.name}.{os.getpid()}.partial")
-    try:
-        FigureCanvasAgg(figure)
-        figure.savefig(partial, format="png", metadata={"Software": None})
-        partial.replace(file)
-    finally:
-        partial.unlink(missing_ok=True)
+    FigureCanvasAgg(figure)
+    with whole_file(file) as partial:
+        # Without the library's name and version the same map stays the same bytes.
+        figure.savefig(partial, metadata={"Software": None})

@@ -4,9 +4,9 @@ It is built once with trimesh and kept on disk under the mesh's content and the 
 """
 
 import hashlib
-import os
 import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from math import floor, sqrt
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +16,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from planner.kernel import cache_directory, kernel
+from planner.whole_file import whole_file
 
 _BLOCK_POINTS = 4096
 """Points handed to trimesh at once: a step of progress, and a bound on the memory."""
@@ -88,10 +89,11 @@ def cached_field(
     if stored is not None:
         return stored
     field = build_field(mesh, spacing_mm, progress)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    partial = file.with_name(f"{file.stem}.{os.getpid()}.partial.npz")
-    np.savez(partial, **field._asdict())
-    partial.replace(file)
+    # A folder that cannot be written costs the next run its time and this one nothing.
+    with suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(file) as partial:
+            np.savez(partial, **field._asdict())
     return field
 
 
@@ -121,8 +123,8 @@ def look_up(
 ) -> float:
     """Return the signed distance in mm at a point of the mesh's frame.
 
-    On the grid it is trilinear, so at most half a cell's diagonal off. Beyond it, it is a lower bound: the mesh lies
-    within the grid, so the way there is the longer side of a triangle that is blunt where it enters the grid.
+    On the grid it is trilinear, so at most half a cell's diagonal off. Beyond it, it is a lower bound: the way to
+    the mesh is the longest side of a triangle with a blunt angle at the grid's nearest point.
     """
     nx, ny, nz = values.shape
     gx, gy, gz = (x - origin[0]) / spacing, (y - origin[1]) / spacing, (z - origin[2]) / spacing

@@ -193,3 +193,15 @@ def test_one_mesh_is_all_a_model_takes() -> None:
     mesh = Obstacle("mesh", FIELD, np.zeros(3), np.eye(4), turning=True, field=field)
     with pytest.raises(ValueError, match="2 obstacles are meshes"):
         model_with(mesh, mesh)
+
+
+def test_poses_that_are_not_reached_are_refused() -> None:
+    model, _ = model_with(*cell_obstacles(CELL))
+    with pytest.raises(ValueError, match="not a finite number"):
+        rate(model, np.full((1, 6), np.nan))
+
+
+def test_a_part_on_the_wrists_own_joints_is_refused() -> None:
+    parts = (*BODIES.parts, BODIES.parts[-1]._replace(frame=5))
+    with pytest.raises(ValueError, match="frame 4 or 5"):
+        model_with(bodies=BODIES._replace(parts=parts))

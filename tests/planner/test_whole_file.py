@@ -1,0 +1,25 @@
+from pathlib import Path
+
+import pytest
+
+from planner.whole_file import whole_file
+
+
+def test_a_file_appears_under_its_name_when_it_is_whole(tmp_path: Path) -> None:
+    with whole_file(tmp_path / "a.txt") as partial:
+        partial.write_text("whole")
+        assert not (tmp_path / "a.txt").exists()
+    assert [file.name for file in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_an_interrupted_file_leaves_what_was_there_and_nothing_else(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("before")
+
+    def write_half() -> None:
+        with whole_file(tmp_path / "a.txt") as partial:
+            partial.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_half()
+    assert [file.read_text() for file in tmp_path.iterdir()] == ["before"]
