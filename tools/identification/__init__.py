@@ -1,0 +1,1 @@
+"""Identification: the table's constants from a recording of its motion."""

@@ -1,0 +1,190 @@
+"""From a recording to a table's constants with their confidence intervals."""
+
+from collections.abc import Callable, Sequence
+from math import exp, log
+from typing import NamedTuple
+
+import numpy as np
+
+from emulator.config import TableConfig
+from tools.emulated import Array
+from tools.identification.estimation import Estimate, Posterior, Prior, estimate
+from tools.identification.likelihood import Intervals
+from tools.identification.parameters import BACKLASH, PARAMETERS, with_logarithms
+from tools.identification.recording import DriveRecording, WireRecording
+from tools.identification.simulation import (
+    commanded_motions,
+    drive_positions_deg,
+    ticks_of,
+    wire_positions_deg,
+)
+from tools.tuning.linear_model import Teeth, load_ratio, speed_gain_deg_s, time_constant_s
+
+_BACKLASH_STARTS_ARCMIN = (4.0, 12.0, 36.0)
+_SURE_95 = 1.96
+_TOLD_SHARE = 0.5
+"""A constant is told by a recording that at least halves what was uncertain of it."""
+
+_WIRE_DELAY_S = 1e-4
+"""How well the times of commands and readings agree: the line delays both alike."""
+
+_START_DEG = 0.02
+"""How far from the reference the encoder may stand at the start."""
+
+_DRIVE_WINDOW_S = 0.008
+
+
+class Constant(NamedTuple):
+    """An estimated constant with its 95 % confidence interval, and whether the recording told it."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    told: bool
+
+
+class Identified(NamedTuple):
+    """The outcome."""
+
+    config: TableConfig
+    constants: tuple[Constant, ...]
+    estimate: Estimate
+    time_s: Array  # of what was compared
+    seen_deg: Array
+    foretold_deg: Array
+
+
+_Derived = Callable[[TableConfig], float]
+
+
+def coulomb_Nm(config: TableConfig) -> float:
+    """Return the Coulomb friction of a driven table at the motor's shaft, its bearing's share with it."""
+    return config.friction.coulomb_Nm + config.table.bearing_friction_Nm * load_ratio(config, Teeth.DRIVING)
+
+
+def coulomb_duty(config: TableConfig) -> float:
+    """Return the duty that the Coulomb friction takes."""
+    motor = config.motor
+    return coulomb_Nm(config) * motor.resistance_ohm / motor.torque_constant_Nm_A / config.driver.supply_V
+
+
+DERIVED: tuple[tuple[str, str, _Derived], ...] = (
+    ("gain", "deg/s at full duty", speed_gain_deg_s),
+    ("time constant", "ms, loaded", lambda config: 1e3 * time_constant_s(config, Teeth.DRIVING)),
+    ("time constant, free", "ms, within the backlash", lambda config: 1e3 * time_constant_s(config, Teeth.FREE)),
+    ("Coulomb friction", "mNm at the motor, loaded", lambda config: 1e3 * coulomb_Nm(config)),
+    ("Coulomb friction as duty", "%", lambda config: 100.0 * coulomb_duty(config)),
+    ("stiction", "times the Coulomb friction", lambda config: config.friction.stiction_ratio),
+    ("viscous friction", "uNm s", lambda config: 1e6 * config.friction.viscous_Nm_s),
+    ("backlash", "arcmin", lambda config: config.gears.backlash_arcmin),
+)
+
+
+def identify(
+    config: TableConfig,
+    recording: WireRecording | DriveRecording,
+    seed: int = 0,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Identified:
+    """Return the constants of the table that was recorded.
+
+    Args:
+        config: What is known beforehand: the controller and its gains, the encoder, the datasheet.
+        recording: A recording that `recording_checks` let pass.
+        seed: Of the search.
+        progress: Called with the share that is done.
+    """
+    problem = _wire_problem if isinstance(recording, WireRecording) else _drive_problem
+    time_s, seen_deg, posterior = problem(config, recording)  # type: ignore[operator]  # each takes its own kind
+    starts = []
+    for arcmin in _BACKLASH_STARTS_ARCMIN:
+        start = posterior.prior.mean.copy()
+        start[BACKLASH] = log(arcmin)
+        starts.append(start)
+    found = estimate(posterior, starts, seed, progress)
+    return Identified(
+        with_logarithms(config, found.vector[: len(PARAMETERS)]),
+        _constants(config, posterior, found, isinstance(recording, DriveRecording)),
+        found,
+        time_s,
+        seen_deg,
+        found.foretold_deg,
+    )
+
+
+def _prior(config: TableConfig, mean: Sequence[float], deviation: Sequence[float]) -> Prior:
+    return Prior(
+        np.array([*(parameter.log_of(config) for parameter in PARAMETERS), *mean]),
+        np.array([*(parameter.spread for parameter in PARAMETERS), *deviation]),
+    )
+
+
+def _wire_problem(config: TableConfig, recording: WireRecording) -> tuple[Array, Array, Posterior]:
+    motions = commanded_motions(config, recording)
+    count_deg = config.counts_per_turn / 360.0
+    seen_deg = recording.position_deg - recording.position_deg[0]
+    half = recording.resolution_deg / 2.0
+    # A reply is a rounded count: it tells between which two counts the encoder stood.
+    low = np.ceil((seen_deg - half) * count_deg - 1e-6) / count_deg
+    high = (np.floor((seen_deg + half) * count_deg + 1e-6) + 1.0) / count_deg
+
+    def foretell(vector: Array) -> Array:
+        *logarithms, delay_s, start_deg = vector
+        return start_deg + wire_positions_deg(with_logarithms(config, logarithms), recording, motions, delay_s)
+
+    prior = _prior(config, [0.0, 0.0], [_WIRE_DELAY_S, _START_DEG])
+    steps = np.array([*(parameter.step for parameter in PARAMETERS), 2e-4, 1e-3])
+    return recording.time_s, seen_deg, Posterior(Intervals(low, high), foretell, prior, steps)
+
+
+def _drive_problem(config: TableConfig, recording: DriveRecording) -> tuple[Array, Array, Posterior]:
+    """Compare the way made in each short window: positions would drift apart without a loop that holds them."""
+    tick_hz = config.control.tick_hz
+    duty, position_deg = ticks_of(recording, tick_hz)
+    window = max(1, round(_DRIVE_WINDOW_S * tick_hz))
+    seen_deg = np.diff(position_deg[::window])
+    count_deg = 360.0 / config.counts_per_turn
+
+    def foretell(vector: Array) -> Array:
+        *logarithms, delay_ticks = vector
+        positions = drive_positions_deg(with_logarithms(config, logarithms), duty, max(delay_ticks, 0.0))
+        return np.diff(positions[::window])
+
+    prior = _prior(config, [1.0], [1.0])
+    steps = np.array([*(parameter.step for parameter in PARAMETERS), 0.1])
+    time_s = np.arange(1, len(seen_deg) + 1) * window / tick_hz
+    return time_s, seen_deg, Posterior(Intervals(seen_deg - count_deg, seen_deg + count_deg), foretell, prior, steps)
+
+
+def _constants(config: TableConfig, posterior: Posterior, found: Estimate, from_drive: bool) -> tuple[Constant, ...]:
+    """Return what follows from the estimate, by linear propagation of the covariance."""
+    size = len(PARAMETERS)
+    before = np.diag(posterior.prior.deviation**2.0)
+    result = []
+    for name, unit, function in DERIVED:
+        slope = np.zeros(len(found.vector))
+        slope[:size] = _log_slope(config, found.vector[:size], function)
+        after, prior = (float(np.sqrt(slope @ spread @ slope)) for spread in (found.covariance, before))
+        value = function(with_logarithms(config, found.vector[:size]))
+        factor = exp(min(_SURE_95 * after, 50.0))
+        result.append(Constant(name, unit, value, value / factor, value * factor, after < _TOLD_SHARE * prior))
+    deviation = float(np.sqrt(found.covariance[size, size]))
+    delay, unit = found.vector[size], "ticks, duty to bridge" if from_drive else "ms, reading behind command"
+    scale = 1.0 if from_drive else 1e3
+    told = bool(deviation < _TOLD_SHARE * posterior.prior.deviation[size])
+    spread = _SURE_95 * deviation
+    result.append(Constant("delay", unit, scale * delay, scale * (delay - spread), scale * (delay + spread), told))
+    return tuple(result)
+
+
+def _log_slope(config: TableConfig, logarithms: Array, function: _Derived) -> Array:
+    step = 1e-4
+    slopes = []
+    for index in range(len(logarithms)):
+        shift = np.zeros_like(logarithms)
+        shift[index] = step
+        ends = [function(with_logarithms(config, logarithms + sign * shift)) for sign in (1.0, -1.0)]
+        slopes.append((log(ends[0]) - log(ends[1])) / (2.0 * step))
+    return np.array(slopes)

@@ -1,0 +1,98 @@
+"""What a table with given constants would answer in the place of the recorded one.
+
+Over the wire the duty is not seen; but it follows from the commands, so the whole emulator runs, controller included. A
+drive's duty is known, so there the plant runs alone.
+"""
+
+from math import ceil
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from emulator import drive_train
+from emulator.batch import COLUMNS, run
+from emulator.config import TableConfig
+from emulator.drive_train import DriveState, DriveTrain
+from tools.emulated import Array, Motion, motion_rows, switched_on
+from tools.identification.recording import DriveRecording, WireRecording
+
+_ANGLE = COLUMNS.index("motor_angle_rad")
+_SEED = 0
+
+
+def commanded_motions(config: TableConfig, recording: WireRecording) -> NDArray[np.int64]:
+    """Return the motions of a recording as `emulator.batch` takes them, from the position of the first reading."""
+    tick_hz = config.control.tick_hz
+    speed, acceleration = config.power_on.speed_deg_s, config.power_on.acceleration_deg_s2
+    start_deg = recording.position_deg[0]
+    motions = []
+    for time_s, verb, value in recording.commands:
+        if verb == "S":
+            speed = value
+        elif verb == "A":
+            acceleration = value
+        else:
+            angle_deg = value if verb == "R" else value - start_deg
+            carried_out_s = ceil(time_s * tick_hz - 1e-3) / tick_hz  # at the end of the tick in which the line was complete
+            motions.append(Motion(carried_out_s, angle_deg, speed, acceleration, by=verb == "R"))
+    return motion_rows(config, motions)
+
+
+def wire_positions_deg(
+    config: TableConfig, recording: WireRecording, motions: NDArray[np.int64], delay_s: float
+) -> Array:
+    """Return where the encoder would be at each reading, from the first reading on.
+
+    Args:
+        config: The table.
+        recording: Whose commands it is given.
+        motions: From `commanded_motions`.
+        delay_s: By how much a reading is older than its time says.
+    """
+    tick_hz = config.control.tick_hz
+    constants, state = switched_on(config, _SEED)
+    ticks = ceil(recording.time_s[-1] * tick_hz) + 2
+    _, samples = run(constants, state, ticks, motions)
+    angle = np.concatenate([[0.0], samples[:, _ANGLE]])
+    read = np.ceil(recording.time_s * tick_hz - 1e-3) - delay_s * tick_hz
+    tick = np.clip(np.floor(read).astype(np.int64), 0, ticks - 1)
+    share = read - tick
+    turned = angle[tick] * (1.0 - share) + angle[tick + 1] * share
+    return np.degrees(turned) / config.gears.ratio
+
+
+def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) -> Array:
+    """Return where the motor turns the table to, after each tick, under a duty that comes late by some ticks.
+
+    Args:
+        config: The table.
+        duty: (n,) for each tick.
+        delay_ticks: From 0; a fraction of a tick mixes two neighbours.
+    """
+    whole = int(delay_ticks)
+    padded = np.concatenate([np.zeros(whole + 1), duty])[: len(duty) + 1]
+    share = delay_ticks - whole
+    applied = (padded[1:] * (1.0 - share) + padded[:-1] * share) * config.driver.supply_V
+    constants, state = switched_on(config, _SEED)
+    angle = np.empty(len(duty))
+    _run_open(constants.drive, state.drive, applied, angle)
+    return np.degrees(angle) / config.gears.ratio
+
+
+def ticks_of(recording: DriveRecording, tick_hz: int) -> tuple[Array, Array]:
+    """Return duty and position at every tick; what a trace leaves out has not changed."""
+    tick = np.round((recording.time_s - recording.time_s[0]) * tick_hz).astype(np.int64)
+    row = np.searchsorted(tick, np.arange(tick[-1] + 1), side="right") - 1
+    return recording.duty[row], recording.position_deg[row]
+
+
+def _open_loop(train: DriveTrain, state: DriveState, voltage_V: Array, angle_rad: Array) -> None:
+    for tick in range(len(voltage_V)):
+        state = drive_train.step(train, state, voltage_V[tick], 0.0)
+        angle_rad[tick] = state.angle_rad
+
+
+# `emulator.batch` has made the plant's functions known to numba.
+_run_open: Any = numba.njit(error_model="numpy", nogil=True)(_open_loop)

@@ -1,0 +1,96 @@
+"""Identify a table: record the right motion over a port, and estimate the constants from a recording.
+
+    python -m tools.identify record --port emulator:// --out trace.csv
+    python -m tools.identify fit trace.csv --out table.toml
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from emulator.config import ConfigError, load_config
+from protocol.client import TableClient
+from protocol.errors import TableError
+from tools.html_report import write_whole
+from tools.identification.excitation import excitation
+from tools.identification.fit_report import fit_report, table_toml, verdict
+from tools.identification.identify_table import identify
+from tools.identification.recorder import record
+from tools.identification.recording import RecordingError, read_recording, write_recording
+from tools.identification.recording_checks import LEAST_DURATION_S, check_recording
+from tools.progress import Progress
+
+_NEEDED = ("gain", "time constant", "Coulomb friction")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line; return its exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        return int(options.run(options))
+    except (ConfigError, RecordingError, TableError, OSError) as error:
+        print(f"identify: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("identify: interrupted", file=sys.stderr)
+        return 130
+
+
+def _record(options: argparse.Namespace) -> int:
+    if options.duration < LEAST_DURATION_S:
+        raise RecordingError(f"--duration is {options.duration:g}; it must be at least {LEAST_DURATION_S:g} s")
+    if options.speed <= 0.0 or options.acceleration <= 0.0:
+        raise RecordingError("--speed and --acceleration must be greater than 0")
+    turns = excitation(options.duration, options.speed, options.acceleration, options.seed)
+    with TableClient.open(options.port, baud=options.baud) as client, Progress("recording") as progress:
+        recording = record(client, turns, options.baud, progress.show)
+    write_recording(options.out, recording)
+    print(f"{options.out}: {len(recording.time_s)} readings, {len(recording.commands)} commands")
+    return 0
+
+
+def _fit(options: argparse.Namespace) -> int:
+    config = load_config(options.config)
+    recording = read_recording(options.recording)
+    try:
+        check_recording(config, recording)
+    except RecordingError as error:
+        raise RecordingError(f"{options.recording}: {error}") from error
+    with Progress("fitting") as progress:
+        found = identify(config, recording, options.seed, progress.show)
+    print("\n".join(map(verdict, found.constants)))
+    untold = [constant.name for constant in found.constants if constant.name in _NEEDED and not constant.told]
+    if untold:
+        raise RecordingError(f"{options.recording}: cannot tell {', '.join(untold)}: too short, or too little excitation")
+    write_whole(options.out, table_toml(found))
+    report = options.out.with_suffix(".html")
+    write_whole(report, fit_report(found, config, str(options.recording)))
+    print(f"wrote {options.out} and {report}", file=sys.stderr)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m tools.identify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    commands = parser.add_subparsers(required=True)
+    recorder = commands.add_parser("record", help="move a table and record its answers (it turns about half a turn each way)")
+    recorder.add_argument("--port", required=True, metavar="URL", help="/dev/ttyUSB0, socket://host:7000, emulator://")
+    recorder.add_argument("--out", required=True, type=Path, metavar="FILE", help="the CSV to write")
+    recorder.add_argument("--baud", type=int, default=9600)
+    recorder.add_argument("--duration", type=float, default=60.0, metavar="S", help="length of the recording (60)")
+    recorder.add_argument("--speed", type=float, default=40.0, metavar="DEG_S", help="the greatest to use (40)")
+    recorder.add_argument("--acceleration", type=float, default=100.0, metavar="DEG_S2", help="the greatest to use (100)")
+    recorder.add_argument("--seed", type=int, default=0, help="of the irregular durations")
+    recorder.set_defaults(run=_record)
+    fitter = commands.add_parser("fit", help="estimate the constants of the recorded table")
+    fitter.add_argument("recording", type=Path, help="a CSV of `record`, of the emulator's trace, or of a drive")
+    fitter.add_argument("--out", required=True, type=Path, metavar="FILE", help="the TOML to write; a report beside it")
+    fitter.add_argument("--config", type=Path, help="what is known of the table: gains, encoder, datasheet (the default table)")
+    fitter.add_argument("--seed", type=int, default=0, help="of the search")
+    fitter.set_defaults(run=_fit)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

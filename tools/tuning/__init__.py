@@ -1,0 +1,1 @@
+"""Gain tuning: linear model, margins, gain design, Monte Carlo, checks on the emulator, report."""

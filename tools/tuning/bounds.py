@@ -1,0 +1,65 @@
+"""The bounds that a gain set must keep, and how far it is from each."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tools.tuning.frequency_response import Array
+from tools.tuning.loop_figures import LoopFigures
+
+
+class Bound(NamedTuple):
+    """One bound on one figure."""
+
+    figure: str  # a field of `LoopFigures`
+    title: str
+    limit: float
+    at_most: bool
+    scale: float  # from the figure's unit to the one that is shown
+    unit: str
+
+    def excess(self, figures: LoopFigures) -> Array:
+        """Return how far the figure is beyond the limit, as a share of it; negative where the bound is kept."""
+        value = getattr(figures, self.figure)
+        share: Array = value / self.limit - 1.0 if self.at_most else 1.0 - value / self.limit
+        return share
+
+    def shown(self, value: float) -> str:
+        """Return a value of this figure with its unit."""
+        return f"{value * self.scale:.3g}{self.unit}"
+
+    def __str__(self) -> str:
+        """Return the bound in words."""
+        return f"{self.title} {'at most' if self.at_most else 'at least'} {self.shown(self.limit)}"
+
+
+class Limits(NamedTuple):
+    """The user's choices."""
+
+    sensitivity_peak: float = 1.7
+    gain_margin_db: float = 8.0
+    phase_margin_deg: float = 40.0
+    noise_duty: float = 0.005
+    bandwidth_hz: float = 10.0
+    overshoot: float = 0.10
+
+    def for_ramp(self) -> tuple[Bound, ...]:
+        """Return the bounds of the ramp set."""
+        return (
+            Bound("sensitivity_peak", "Ms", self.sensitivity_peak, True, 1.0, ""),
+            Bound("gain_margin_db", "gain margin", self.gain_margin_db, False, 1.0, " dB"),
+            Bound("phase_margin_deg", "phase margin", self.phase_margin_deg, False, 1.0, " deg"),
+            Bound("noise_duty", "noise at the PWM", self.noise_duty, True, 100.0, " % duty"),
+            Bound("bandwidth_hz", "bandwidth", self.bandwidth_hz, False, 1.0, " Hz"),
+        )
+
+    def for_hold(self) -> tuple[Bound, ...]:
+        """Return the bounds of the constant-speed set: those of the ramp set, and a clean step answer."""
+        return (*self.for_ramp(), Bound("overshoot", "overshoot", self.overshoot, True, 100.0, " %"))
+
+
+def violation(bounds: tuple[Bound, ...], figures: LoopFigures) -> Array:
+    """Return the sum of all excesses: 0 where all bounds are kept; an unstable loop keeps none."""
+    total = np.sum([np.maximum(bound.excess(figures), 0.0) for bound in bounds], axis=0)
+    result: Array = np.where(figures.stable, total, np.inf)
+    return result

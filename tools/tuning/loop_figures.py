@@ -1,0 +1,94 @@
+"""What a gain set is judged by: figures of the linear loop, for many plants or many gain sets at once."""
+
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emulator.config import TableConfig
+from tools.tuning.frequency_response import Array, Complex, PlantResponse, grid_hz, grid_z, plant_response
+from tools.tuning.linear_model import Teeth, duty_gains, quantisation_noise, speed_gain_deg_s
+from tools.tuning.margins import controller, margins, noise_duty
+
+
+class Loops(NamedTuple):
+    """The plants of one or many tables in each state of the backlash, on one grid of frequencies."""
+
+    config: TableConfig  # whose controller they all have
+    z: Complex
+    frequency_hz: Array
+    plants: dict[Teeth, PlantResponse]
+    speed_gain_deg_s: Array
+
+    @classmethod
+    def of(cls, configs: list[TableConfig], grid_size: int) -> Self:
+        """Return the loops of tables that differ in their plants alone."""
+        z = grid_z(grid_size)
+        return cls(
+            configs[0],
+            z,
+            grid_hz(configs[0], grid_size),
+            {teeth: plant_response(configs, teeth, z) for teeth in Teeth},
+            np.array([speed_gain_deg_s(config) for config in configs]),
+        )
+
+
+class LoopFigures(NamedTuple):
+    """Figures of loops, each an array; the margins and the noise are the worst of all states of the backlash."""
+
+    stable: NDArray[np.bool_]
+    sensitivity_peak: Array
+    gain_margin_db: Array
+    phase_margin_deg: Array
+    noise_duty: Array  # standard deviation of the duty, from the rounding of the position to counts
+    bandwidth_hz: Array  # -3 dB of the speed over the reference, loaded
+    overshoot: Array  # of the speed after a step of the reference, loaded; 0.1 is 10 %
+    ramp_lag_s: Array  # speed error over acceleration on a ramp
+    load_peak_deg_s_Nm: Array  # speed lost at most after a step of the load
+
+
+def loop_figures(loops: Loops, registers: Array) -> LoopFigures:
+    """Return the figures of gain sets given as the firmware's register values, shape (n, 3) or (1, 3)."""
+    config, z = loops.config, loops.z
+    gains = duty_gains(config, registers)
+    regulator = controller(gains, z)
+    window_ticks, tick_hz = config.control.speed_window_ticks, config.control.tick_hz
+    per_state = [margins(regulator.by_measured * plant.measured_by_duty, loops.frequency_hz) for plant in loops.plants.values()]
+    count_deg, _ = quantisation_noise(config)
+    noises = [
+        noise_duty(regulator, plant, count_deg, window_ticks / tick_hz, window_ticks, z) for plant in loops.plants.values()
+    ]
+    plant = loops.plants[Teeth.DRIVING]
+    sensitivity = 1.0 / (1.0 + regulator.by_measured * plant.measured_by_duty)
+    tracking = plant.speed_by_duty * regulator.by_reference * sensitivity
+    rejection = plant.speed_by_load - plant.speed_by_duty * regulator.by_measured * sensitivity * plant.measured_by_load
+    return LoopFigures(
+        stable=np.all([state.stable for state in per_state], axis=0),
+        sensitivity_peak=np.max([state.sensitivity_peak for state in per_state], axis=0),
+        gain_margin_db=np.min([state.gain_margin_db for state in per_state], axis=0),
+        phase_margin_deg=np.min([state.phase_margin_deg for state in per_state], axis=0),
+        noise_duty=np.max(noises, axis=0),
+        bandwidth_hz=_bandwidth_hz(tracking, loops.frequency_hz),
+        overshoot=step_answer(tracking, 1.0).max(axis=-1) - 1.0,
+        ramp_lag_s=1.0 / (gains[..., 1] * tick_hz * loops.speed_gain_deg_s),
+        load_peak_deg_s_Nm=-step_answer(rejection, 0.0).min(axis=-1),
+    )
+
+
+def step_answer(response: Complex, at_rest: float) -> Array:
+    """Return the answer to a unit step of a stable system, by the inverse Fourier transform of its response.
+
+    Args:
+        response: The response on `grid_z`; its answer to an impulse must be over within the grid's length.
+        at_rest: Its value at 0 Hz, which is what the answer comes to.
+    """
+    whole = np.concatenate([np.full((*response.shape[:-1], 1), at_rest, dtype=complex), response], axis=-1)
+    answer: Array = np.cumsum(np.fft.irfft(whole, axis=-1), axis=-1)
+    return answer
+
+
+def _bandwidth_hz(tracking: Complex, frequency_hz: Array) -> Array:
+    below = np.abs(tracking) < np.sqrt(0.5)
+    first = np.where(below.any(axis=-1), np.argmax(below, axis=-1), -1)
+    result: Array = frequency_hz[first]
+    return result

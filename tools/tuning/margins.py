@@ -1,0 +1,95 @@
+"""Robustness and performance of a speed loop, read from its frequency response.
+
+    L = C G              loop, C the regulator, G the plant with its delay
+    S = 1 / (1 + L)      sensitivity; Ms its peak: 1/Ms is the least distance of L from -1
+
+All functions work along the last axis, the frequencies of `frequency_response.grid_z`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tools.tuning.frequency_response import Array, Complex, PlantResponse
+
+
+class Controller(NamedTuple):
+    """The regulator's responses: to the reference, and to the measured speed (the derivative acts on that alone)."""
+
+    by_reference: Complex
+    by_measured: Complex
+
+
+class Margins(NamedTuple):
+    """Robustness of a loop; where `stable` is false the others mean nothing."""
+
+    stable: NDArray[np.bool_]
+    sensitivity_peak: Array
+    gain_margin_db: Array
+    phase_margin_deg: Array
+    crossover_hz: Array
+
+
+def controller(gains: Array, z: Complex) -> Controller:
+    """Return the regulators' responses; gains (..., 3) in duty per deg/s as of `linear_model.duty_gains`."""
+    proportional, integral, derivative = (gains[..., [column]] for column in range(3))
+    difference = 1.0 - 1.0 / z
+    by_reference = proportional + integral / difference
+    return Controller(by_reference, by_reference + derivative * difference)
+
+
+def margins(loop: Complex, frequency_hz: Array) -> Margins:
+    """Return the margins of loops L of stable plants with an integrating regulator; shape (..., frequencies)."""
+    distance = 1.0 + loop
+    # Nyquist: from -90 deg at 0 Hz, on the integrator's account, 1 + L must turn by +90 deg and not about the origin.
+    turned = np.angle(distance[..., 0]) + np.angle(distance[..., 1:] / distance[..., :-1]).sum(axis=-1)
+    return Margins(
+        np.abs(turned) < np.pi / 2,
+        1.0 / np.abs(distance).min(axis=-1),
+        _gain_margin_db(loop),
+        *_phase_margin(loop, frequency_hz),
+    )
+
+
+def _gain_margin_db(loop: Complex) -> Array:
+    """Where L crosses the negative real axis, its distance from the origin, linear between two frequencies."""
+    a, b = loop[..., :-1], loop[..., 1:]
+    share = _crossing(a.imag, b.imag)
+    real = a.real + share * (b.real - a.real)
+    crosses = (a.imag * b.imag < 0.0) & (real < 0.0)
+    greatest = np.max(np.where(crosses, -real, 1e-6), axis=-1)
+    result: Array = -20.0 * np.log10(greatest)
+    return result
+
+
+def _phase_margin(loop: Complex, frequency_hz: Array) -> tuple[Array, Array]:
+    """Return the least angle from -180 deg where |L| crosses 1, and the last such frequency."""
+    size = np.log(np.abs(loop))
+    a, b = size[..., :-1], size[..., 1:]
+    crosses = a * b < 0.0
+    share = _crossing(a, b)
+    turn = np.angle(loop[..., 1:] / loop[..., :-1])
+    angle = np.abs(np.angle(-loop[..., :-1] * np.exp(1j * share * turn)))
+    margin_deg = np.degrees(np.min(np.where(crosses, angle, np.pi), axis=-1))
+    low, high = frequency_hz[:-1], frequency_hz[1:]
+    crossover_hz = np.max(np.where(crosses, low + share * (high - low), 0.0), axis=-1)
+    return margin_deg, crossover_hz
+
+
+def _crossing(a: Array, b: Array) -> Array:
+    """Return the share of the way from a to b at which the line through them is 0."""
+    change = b - a
+    return np.clip(-a / np.where(change == 0.0, 1.0, change), 0.0, 1.0)
+
+
+def noise_duty(control: Controller, plant: PlantResponse, count_deg: float, window_s: float, window_ticks: int, z: Complex) -> Array:
+    """Return the standard deviation of the duty that the rounding of the position to counts causes.
+
+    The noise enters as the difference of two counts over the window. Parseval: the variance is the mean over all
+    frequencies of the squared response.
+    """
+    speed_by_count = (1.0 - z**-window_ticks) / window_s
+    response = control.by_measured / (1.0 + control.by_measured * plant.measured_by_duty) * speed_by_count
+    result: Array = count_deg * np.sqrt(np.mean(np.abs(response) ** 2, axis=-1))
+    return result
