@@ -164,7 +164,7 @@ def _open_pty(link_path: Path | None, baud: int, stack: ExitStack) -> Port:
     stack.callback(port.close)
     if link_path:
         with _usage(f"--link {link_path}"):
-            link = DeviceLink(link_path, port.name)
+            port.link = link = DeviceLink(link_path, port.name)
         stack.callback(link.remove)
         if link.replaced:
             _say(f"{link_path} led to {link.replaced} and now leads to {port.name}")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Self, get_type_hints
 
+from emulator.faults import Fault, FaultError, fault_from
 from emulator.fixed_point import SPEED_BITS
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
@@ -153,6 +154,7 @@ class TableConfig:
     limits: MotionConfig
     power_on: MotionConfig
     serial: SerialConfig
+    faults: tuple[Fault, ...] = ()  # [[faults]] of a file; none are shipped
 
     @property
     def counts_per_turn(self) -> float:
@@ -179,7 +181,9 @@ def load_config(path: str | Path | None = None) -> TableConfig:
     """
     defaults = _read(DEFAULT_FILE)
     source = DEFAULT_FILE.name if path is None else str(path)
-    merged = defaults if path is None else _merged(defaults, _read(Path(path)), source, "")
+    changes = {} if path is None else _read(Path(path))
+    faults = _faults(changes.pop("faults", []), f"{source}: faults")
+    merged = _merged(defaults, changes, source, "") | {"faults": faults}
     config: TableConfig = _section(TableConfig, merged, source, "")
     _check_together(config, source)
     return config
@@ -208,16 +212,30 @@ def _merged(defaults: dict[str, Any], changes: dict[str, Any], source: str, wher
 
 def _section(kind: type[Any], values: dict[str, Any], source: str, where: str) -> Any:  # noqa: ANN401  # an instance of `kind`
     types = get_type_hints(kind)
-    arguments = {}
+    arguments: dict[str, Any] = {}
     for entry in fields(kind):
         name = f"{where}.{entry.name}" if where else entry.name
         wanted, value = types[entry.name], values[entry.name]
-        if is_dataclass(wanted):
+        if isinstance(value, tuple):
+            arguments[entry.name] = value  # the faults, which have been looked at
+        elif is_dataclass(wanted):
             arguments[entry.name] = _section(wanted, value, source, name)  # type: ignore[arg-type]  # a dataclass's type
         else:
             arguments[entry.name] = _number(wanted, value, entry.metadata, f"{source}: {name}")
     constructor: Any = kind
     return constructor(**arguments)
+
+
+def _faults(entries: object, where: str) -> tuple[Fault, ...]:
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise ConfigError(f"{where} is {entries!r}; each fault is a table of its own, [[faults]]")
+    try:
+        return tuple(
+            fault_from(entry.get("fault"), {key: value for key, value in entry.items() if key != "fault"})
+            for entry in entries
+        )
+    except FaultError as error:
+        raise ConfigError(f"{where}: {error}") from error
 
 
 def _number(wanted: type, value: object, limits: Any, where: str) -> float | int | bool:  # noqa: ANN401  # a field's metadata

@@ -13,6 +13,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+from emulator.faults import KINDS, Fault, FaultError, fault_from, parameters_of
+from emulator.parameter import Parameter
 from emulator.status import TableStatus
 
 LONGEST_REQUEST = 4096
@@ -51,18 +53,21 @@ class Stand(Protocol):
         """Cut the table's power and switch it on again."""
         ...
 
+    def preset(self, count: int) -> None:
+        """Cut the table's power and switch it on again, with its counter at `count`."""
+        ...
+
+    def inject(self, fault: Fault) -> None:
+        """Let something go wrong, now or when the fault says."""
+        ...
+
+    def clear_faults(self) -> None:
+        """End all faults."""
+        ...
+
     def quit(self) -> None:
         """End when the present events are served."""
         ...
-
-
-class Parameter(NamedTuple):
-    """A number that a command takes, and the closed interval that it must lie in."""
-
-    name: str
-    least: float
-    most: float
-    help: str
 
 
 class Command(NamedTuple):
@@ -71,6 +76,15 @@ class Command(NamedTuple):
     help: str
     parameters: tuple[Parameter, ...]
     run: Callable[[Stand, Mapping[str, float]], Mapping[str, Any] | None]
+
+
+def _fault_command(kind: str) -> Command:
+    """Return the command that injects a fault of this kind."""
+    return Command(
+        f"fault: {KINDS[kind].help}",
+        parameters_of(kind),
+        lambda stand, given: stand.inject(fault_from(kind, given)),
+    )
 
 
 COMMANDS: Mapping[str, Command] = {
@@ -95,8 +109,14 @@ COMMANDS: Mapping[str, Command] = {
         lambda stand, given: stand.set_time_scale(given["time_scale"]),
     ),
     "reset": Command("cut the table's power and switch it on again", (), lambda stand, _: stand.reset()),
+    "preset": Command(
+        "reset the table, and let its counter begin elsewhere than at 0",
+        (Parameter("count", -(2**31), 2**31 - 1, "where the counter begins"),),
+        lambda stand, given: stand.preset(int(given["count"])),
+    ),
+    "clear-faults": Command("end all faults, and forget those to come", (), lambda stand, _: stand.clear_faults()),
     "quit": Command("end the stand-in as SIGTERM does", (), lambda stand, _: stand.quit()),
-}
+} | {f"fault-{kind}": _fault_command(kind) for kind in KINDS}
 """Every verb, in one place: the server runs them, the command-line client shows them."""
 
 
@@ -108,9 +128,9 @@ def answer(request: bytes, stand: Stand) -> bytes:
     """Carry out one request and return its answer; a bad request changes nothing."""
     try:
         command, given = _parse(request)
-    except RequestError as error:
+        result = command.run(stand, given) or {}
+    except (RequestError, FaultError) as error:
         return _refusal(str(error))
-    result = command.run(stand, given) or {}
     return json.dumps({"ok": True, **result}).encode() + b"\n"
 
 
@@ -124,19 +144,23 @@ def _parse(request: bytes) -> tuple[Command, dict[str, float]]:
     if name not in COMMANDS:
         raise RequestError(f"'{name}' is no command; there are {', '.join(COMMANDS)}")
     command = COMMANDS[name]
-    expected = [parameter.name for parameter in command.parameters]
-    if sorted(fields) != sorted(expected):
+    required = {parameter.name for parameter in command.parameters if not parameter.optional}
+    if not required <= fields.keys() <= {parameter.name for parameter in command.parameters}:
+        expected = [
+            f"{parameter.name} (optional)" if parameter.optional else parameter.name for parameter in command.parameters
+        ]
         raise RequestError(f"{name} takes {' and '.join(expected) or 'no parameter'}, and nothing else")
     return command, {
-        parameter.name: _number(name, parameter, fields[parameter.name]) for parameter in command.parameters
+        parameter.name: _number(name, parameter, fields[parameter.name])
+        for parameter in command.parameters
+        if parameter.name in fields
     }
 
 
-def _number(command: str, parameter: Parameter, value: object) -> float:
-    if isinstance(value, int | float) and not isinstance(value, bool) and parameter.least <= value <= parameter.most:
+def _number(command: str, parameter: Parameter, value: Any) -> float:  # noqa: ANN401  # from outside
+    if parameter.accepts(value):
         return float(value)
-    allowed = f"a number from {parameter.least:g} to {parameter.most:g}"
-    raise RequestError(f"{command}: {parameter.name} must be {allowed}, not {json.dumps(value)}")
+    raise RequestError(f"{command}: {parameter.name} must be {parameter.allowed}, not {json.dumps(value)}")
 
 
 class ControlSocket:

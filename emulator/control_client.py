@@ -48,7 +48,8 @@ def request(path: Path, command: str, **parameters: float) -> dict[str, Any]:
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     parsed = _parser().parse_args(arguments)
-    parameters = {parameter.name: getattr(parsed, parameter.name) for parameter in COMMANDS[parsed.command].parameters}
+    given = {parameter.name: getattr(parsed, parameter.name) for parameter in COMMANDS[parsed.command].parameters}
+    parameters = {name: value for name, value in given.items() if value is not None}
     try:
         result = request(parsed.path, parsed.command, **parameters)
     except ControlError as error:
@@ -71,7 +72,8 @@ def _parser() -> argparse.ArgumentParser:
     for name, command in COMMANDS.items():
         subparser = commands.add_parser(name, help=command.help, description=command.help)
         for parameter in command.parameters:
-            subparser.add_argument(parameter.name, type=float, help=parameter.help)
+            name = "--" + parameter.name.replace("_", "-") if parameter.optional else parameter.name
+            subparser.add_argument(name, type=float, help=parameter.help)
     return parser
 
 

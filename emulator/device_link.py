@@ -27,6 +27,11 @@ class DeviceLink:
         else:
             _replace(path, device)
 
+    def lead_to(self, device: str) -> None:
+        """Lead to another device from now on."""
+        _replace(self.path, device)
+        self._device = device
+
     def remove(self) -> None:
         """Take the link away, unless somebody else has put another one there since."""
         with suppress(OSError):

@@ -6,10 +6,10 @@ faults strike the same bytes at the same ticks.
 
 import math
 from collections import deque
-from collections.abc import Iterable
 from random import Random
 from typing import NamedTuple
 
+from emulator.config import TableConfig
 from emulator.drive_train import step as drive_step
 from emulator.encoder import count_at
 from emulator.faults import KINDS, Fault
@@ -46,18 +46,18 @@ class Active(NamedTuple):
 class Faults:
     """The faults of one table: those to come, and those that hold."""
 
-    def __init__(self, faults: Iterable[Fault], baud: int, tick_hz: int, supply_V: float, seed: int) -> None:
-        """Take the faults of a configuration; a fault without a beginning holds from the start."""
-        self._baud = baud
-        self._tick_hz = tick_hz
-        self._supply_V = supply_V
+    def __init__(self, config: TableConfig, seed: int) -> None:
+        """Take the faults of a configuration; one without a beginning holds from the start."""
+        self._baud = config.serial.baud
+        self._tick_hz = config.control.tick_hz
+        self._supply_V = config.driver.supply_V
         self._chance = Random(f"faults {seed}")  # noqa: S311  # no secret
         self._plans: list[Plan] = []
         self._active: dict[str, Active] = {}
         self._held: deque[tuple[int, bytes]] = deque()
         self._lines = 0
         self._bounce_end_tick = 0
-        for fault in faults:
+        for fault in config.faults:
             self.inject(fault, 0)
 
     def inject(self, fault: Fault, tick: int) -> None:

@@ -48,6 +48,14 @@ class Port(Protocol):
         """Give the client more of what it has not taken yet."""
         ...
 
+    def hang_up(self) -> None:
+        """Go away, as an adapter that is pulled out."""
+        ...
+
+    def come_back(self) -> None:
+        """Be there again after `hang_up`."""
+        ...
+
     def close(self) -> None:
         """Give everything back to the system."""
         ...

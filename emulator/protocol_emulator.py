@@ -68,6 +68,7 @@ class Serial(SerialBase):
             self.table = _table_of(self.port)
             self.clock = VirtualClock(self)
             self._table_url = self.port
+        self._require_line()
         self._received = bytearray()
         self._reconfigure_port()
         self.is_open = True
@@ -75,7 +76,8 @@ class Serial(SerialBase):
     def close(self) -> None:
         """Let what was written reach the table, and go; the motion that is running goes on."""
         if self.is_open:
-            self.flush()
+            if not self.table.hung_up:
+                self.flush()
             self.table.disconnect()
             self.is_open = False
 
@@ -201,6 +203,11 @@ class Serial(SerialBase):
     def _require_open(self) -> None:
         if not self.is_open:
             raise PortNotOpenError
+        self._require_line()
+
+    def _require_line(self) -> None:
+        if self.table.hung_up:
+            raise SerialException(f"{self.port}: the device has gone (fault hang-up)")
 
     def _deadline(self, timeout_s: float | None) -> int | None:
         return None if timeout_s is None else self.table.tick + self.ticks(timeout_s)

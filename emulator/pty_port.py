@@ -13,6 +13,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
+from emulator.device_link import DeviceLink
 from emulator.framing import rates_agree, read_at_rate
 from emulator.inotify import CLOSED, OPENED, WRITTEN, DeviceWatch
 from emulator.outbox import Outbox
@@ -32,6 +33,9 @@ class PtyPort:
         baud: the table's rate in baud; 0 when bytes are not paced, and no rate of the client's is then wrong.
         warn: takes one sentence for the person who runs the stand-in.
 
+    Attributes:
+        link: what leads to the device by another name.
+
     Raises:
         OSError: the system has no pty to give.
     """
@@ -39,18 +43,25 @@ class PtyPort:
     def __init__(self, baud: int, warn: Callable[[str], None]) -> None:
         self._baud = baud
         self._warn = warn
+        self.link: DeviceLink | None = None
+        self._outbox = Outbox()
+        self._open()
+
+    def _open(self) -> None:
+        self._is_away = False
         self._server, self._device = os.openpty()
         tty.setraw(self._device)
-        set_baud(self._device, baud or _DEFAULT_BAUD)
+        set_baud(self._device, self._baud or _DEFAULT_BAUD)
         os.set_blocking(self._server, False)
         self._settings = termios.tcgetattr(self._device)
         self.name = os.ttyname(self._device)
         self._watch = DeviceWatch.start(Path(self.name))
         if self._watch is None:
-            warn(f"this system does not tell who opens {self.name}: a client that leaves in mid-line goes unnoticed")
+            self._warn(
+                f"this system does not tell who opens {self.name}: a client that leaves in mid-line goes unnoticed"
+            )
         self._clients = 0
-        self._client_baud = baud
-        self._outbox = Outbox()
+        self._client_baud = self._baud
 
     @property
     def client_count(self) -> int:
@@ -60,6 +71,8 @@ class PtyPort:
     @property
     def input_descriptors(self) -> tuple[int, ...]:
         """What becomes readable when a client comes, goes or sends."""
+        if self._is_away:
+            return ()
         return (self._server,) if self._watch is None else (self._server, self._watch.descriptor)
 
     @property
@@ -81,7 +94,7 @@ class PtyPort:
 
     def send(self, data: bytes) -> None:
         """Give replies to the client; they are lost when nobody has the port open, or nobody reads it."""
-        if self._watch is not None and self._clients == 0:
+        if self._is_away or (self._watch is not None and self._clients == 0):
             return
         was_dropping = bool(self._outbox.dropped_bytes)
         self._outbox.put(self._as_heard(data, self._baud, self._client_baud))
@@ -93,8 +106,23 @@ class PtyPort:
         """Give the client more of the replies that it has not taken yet."""
         self._outbox.flush(partial(os.write, self._server))
 
+    def hang_up(self) -> None:
+        """Go away, as an adapter that is pulled out: a client reads end of file, and the device is no more."""
+        self.close()
+        self._is_away = True
+        self._outbox.clear()
+
+    def come_back(self) -> None:
+        """Be there again after `hang_up`: a new device, to which the link leads."""
+        self._open()
+        if self.link is not None:
+            self.link.lead_to(self.name)
+        self._warn(f"the port has come back as {self.name}")
+
     def close(self) -> None:
         """Close both ends; a client that is still there reads end of file."""
+        if self._is_away:
+            return
         if self._watch is not None:
             self._watch.close()
         os.close(self._device)

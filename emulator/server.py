@@ -10,6 +10,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from emulator.clock import Clock
+from emulator.faults import Fault
 from emulator.port import Port
 from emulator.signals import SignalWatch
 from emulator.status import TableStatus
@@ -65,12 +66,15 @@ class Server:
         self._said_slow = False
         self._said_two = False
         self._leaving = False
+        self._hung_up = False
 
     def run(self) -> None:
         """Serve until a signal or the control channel ends it."""
         while self._running:
             readable, writable = self._wait()
             self._catch_up()
+            if self._table.hung_up is not self._hung_up:
+                self._follow_hang_up()
             for port in self._ports:
                 if not writable.isdisjoint(port.output_descriptors):
                     port.flush()
@@ -110,6 +114,18 @@ class Server:
     def reset(self) -> None:
         """Cut the table's power and switch it on again."""
         self._table.reset()
+
+    def preset(self, count: int) -> None:
+        """Cut the table's power and switch it on again, with its counter at `count`."""
+        self._table.reset(count)
+
+    def inject(self, fault: Fault) -> None:
+        """Let something go wrong, now or when the fault says."""
+        self._table.inject(fault)
+
+    def clear_faults(self) -> None:
+        """End all faults."""
+        self._table.clear_faults()
 
     def quit(self) -> None:
         """End `run` when the present events are served."""
@@ -159,6 +175,15 @@ class Server:
                 f"simulated time falls behind: this machine is busy, or too slow for time scale {self.time_scale:g}"
             )
             self._said_slow = True
+
+    def _follow_hang_up(self) -> None:
+        """Take the ports away, or bring them back, as a fault of the table says."""
+        self._hung_up = self._table.hung_up
+        for port in self._ports:
+            if self._hung_up:
+                port.hang_up()
+            else:
+                port.come_back()
 
     def _serve_port(self, port: Port) -> None:
         arrival = port.receive()

@@ -3,12 +3,15 @@
 import copy
 import math
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 from emulator.config import TableConfig
 from emulator.drive_train import DriveState, at_standstill
 from emulator.encoder import angle_within_tick, count_at
+from emulator.fault_effects import TO_CLIENT, TO_TABLE, Faults
+from emulator.faults import Fault
 from emulator.firmware import IDLE, STALLED, power_on
 from emulator.fixed_point import wrap_int32
 from emulator.interpreter import Interpreter, Registers
@@ -38,6 +41,7 @@ class Snapshot(NamedTuple):
     lines: LineBuffer
     triggers: TriggerInput
     replies: bytes
+    faults: Faults
     load_torque_Nm: float
     true_zero_rad: float
 
@@ -65,11 +69,13 @@ class Table:
         self._lines = LineBuffer()
         self._triggers = TriggerInput(config.control.tick_hz)
         self._replies = b""
+        self._faults = Faults(config, seed)
         self._heard = self._said = b""  # in this tick, for the observer
         self._resting = False
 
     def receive(self, data: bytes) -> None:
         """Take bytes that the client puts on the line now."""
+        data = self._faults.on_the_line(data, TO_TABLE)
         if self.config.serial.baud:
             self._uart.receive(data)
         else:
@@ -82,11 +88,32 @@ class Table:
 
     def ticks_until_byte(self) -> int | None:
         """Return the ticks until the next byte in either direction is over; None while the line is idle."""
-        return self._uart.ticks_until_byte() if self.config.serial.baud else None
+        ticks = self._uart.ticks_until_byte() if self.config.serial.baud else None
+        held_until = self._faults.held_until
+        if held_until is None:
+            return ticks
+        held = max(1, held_until - self.tick)
+        return held if ticks is None else min(ticks, held)
+
+    @property
+    def hung_up(self) -> bool:
+        """Whether a fault has taken the port away."""
+        return self._faults.hangs_up
+
+    def inject(self, fault: Fault) -> None:
+        """Let something go wrong, now or when the fault says."""
+        with self._faults_beginning():
+            self._faults.inject(fault, self.tick)
+        self._resting = False
+
+    def clear_faults(self) -> None:
+        """End all faults, and forget those to come; replies that are late are still to come."""
+        self._faults.clear()
 
     def disconnect(self) -> None:
         """Let the client go: its half line and its unsent replies are forgotten, its motion goes on."""
         self._uart.disconnect()
+        self._faults.disconnect()
         self._lines.discard()
         self._replies = b""
 
@@ -96,14 +123,16 @@ class Table:
             raise ValueError(f"time cannot go back by {-ticks} ticks")
         end = self.tick + ticks
         while self.tick < end:
-            if not self._uart.idle or self.observer is not None:
+            if not self._uart.idle or self.observer is not None or self._faults.turns_the_drive:
                 self._advance_watched()
             else:
-                edge = self._triggers.next_tick
-                if edge is not None and edge <= self.tick:
+                event = self._next_event(end)
+                if event <= self.tick:
                     self._advance_watched()
                 else:
-                    self._advance_undisturbed(end if edge is None else min(end, edge))
+                    self._advance_undisturbed(event)
+        if self._faults.next_tick is not None:
+            self._serve_faults()
 
     @property
     def trigger_hz(self) -> float:
@@ -119,7 +148,7 @@ class Table:
         if not 0.0 <= fraction < 1.0:
             raise ValueError(f"an edge at {fraction} of a tick is outside 0..1")
         if fraction == 0.0:
-            self._latch(self._state.drive.angle_rad)
+            self._see_edge(self._state.drive.angle_rad)
         else:
             self._triggers.add_edge(self.tick, fraction)
 
@@ -153,6 +182,7 @@ class Table:
                 self._lines,
                 self._triggers,
                 self._replies,
+                self._faults,
                 self._load_torque_Nm,
                 self._true_zero_rad,
             )
@@ -169,6 +199,7 @@ class Table:
             self._lines,
             self._triggers,
             self._replies,
+            self._faults,
             self._load_torque_Nm,
             self._true_zero_rad,
         ) = copy.deepcopy(snapshot)
@@ -186,6 +217,13 @@ class Table:
             true_zero_rad=self._true_zero_rad,
         )
 
+    def _next_event(self, end: int) -> int:
+        """Return the tick, `end` at the latest, at which an edge comes or a fault begins or ends."""
+        edge, fault = self._triggers.next_tick, self._faults.next_tick
+        if edge is not None and edge < end:
+            end = edge
+        return end if fault is None else min(end, fault)
+
     def _advance_undisturbed(self, end: int) -> None:
         """Pass ticks in which nothing comes from outside; a state that repeats itself stays to the end."""
         constants, torque_Nm, state = self._constants, self._load_torque_Nm, self._state
@@ -199,20 +237,48 @@ class Table:
         self._state, self.tick = state, end
 
     def _advance_watched(self) -> None:
-        """Pass one tick in which the line, an edge or the observer has its turn."""
-        before = self._state
-        self._state = step(self._constants, before, self._load_torque_Nm)
+        """Pass one tick in which the line, an edge, a fault or the observer has its turn."""
+        faults, before = self._faults, self._state
+        if faults.next_tick is not None:
+            self._serve_faults()
+        if faults.turns_the_drive:
+            self._constants, self._state = faults.step(self._constants, before, self._load_torque_Nm)
+        else:
+            self._state = step(self._constants, before, self._load_torque_Nm)
         self._resting = False
         while (fraction := self._triggers.take(self.tick)) is not None:
             drive, tick_s = before.drive, self._constants.drive.tick_s
             end_rad = self._state.drive.angle_rad
-            self._latch(angle_within_tick(drive.angle_rad, end_rad, drive.speed_rad_s, tick_s, fraction))
+            self._see_edge(angle_within_tick(drive.angle_rad, end_rad, drive.speed_rad_s, tick_s, fraction))
         self.tick += 1
         if not self._uart.idle:
             self._serve_line()
         if self.observer is not None:
             heard, said, self._heard, self._said = self._heard, self._said, b"", b""
             self.observer(self.status(), heard, said)
+
+    def _serve_faults(self) -> None:
+        """Let faults begin and end, and replies go on that were held back."""
+        with self._faults_beginning():
+            self._faults.begin_tick(self.tick)
+        if held := self._faults.released(self.tick):
+            self._put(held)
+
+    @contextmanager
+    def _faults_beginning(self) -> Iterator[None]:
+        """Let the client go when a fault that begins in this block takes the port away."""
+        was_up = not self.hung_up
+        yield
+        if was_up and self.hung_up:
+            self.disconnect()
+
+    def _see_edge(self, angle_rad: float) -> None:
+        """Latch, unless a fault hides the edge; one that bounces is followed by others."""
+        if self._faults.misses_edge():
+            return
+        self._latch(angle_rad)
+        for tick, fraction in self._faults.bounces(self.tick):
+            self._triggers.add_edge(tick, fraction)
 
     def _latch(self, angle_rad: float) -> None:
         self._registers = self._registers._replace(latched_count=count_at(self._constants.encoder, angle_rad))
@@ -232,11 +298,17 @@ class Table:
     def _interpret(self, data: bytes) -> None:
         self._heard += data if self.observer else b""
         for line in self._lines.feed(data):
+            with self._faults_beginning():
+                self._faults.hear_line(self.tick)
             reply = self._reply(line if isinstance(line, ErrorCode) else decode_command(line))
-            if self.config.serial.baud:
-                self._uart.write(reply)
-            else:
-                self._send(reply)
+            self._put(self._faults.on_a_reply(reply, self.tick))
+
+    def _put(self, reply: bytes) -> None:
+        """Give a reply to the line."""
+        if self.config.serial.baud:
+            self._uart.write(reply)
+        else:
+            self._send(reply)
 
     def _reply(self, command: Command | ErrorCode) -> bytes:
         """Carry a line out and return its reply; in strict Table 1 mode a refused line has none."""
@@ -252,6 +324,7 @@ class Table:
         return b"" if serial.strict and isinstance(reply, Refusal) else encode_reply(reply, serial.decimals)
 
     def _send(self, data: bytes) -> None:
+        data = self._faults.on_the_line(data, TO_CLIENT)
         self._replies += data
         self._said += data if self.observer else b""
 

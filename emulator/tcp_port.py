@@ -46,6 +46,7 @@ class TcpPort:
         self._listener.setblocking(False)
         self._client: socket.socket | None = None
         self._outbox = Outbox()
+        self._is_away = False
         bound_port = self._listener.getsockname()[1]
         self.name = f"socket://[{host}]:{bound_port}" if ":" in host else f"socket://{host}:{bound_port}"
 
@@ -89,6 +90,15 @@ class TcpPort:
             except OSError:
                 self._outbox.clear()  # The connection is broken: the next read says so.
 
+    def hang_up(self) -> None:
+        """Go away, as an adapter that is pulled out: clients are turned away at once."""
+        self._hang_up()
+        self._is_away = True
+
+    def come_back(self) -> None:
+        """Be there again after `hang_up`."""
+        self._is_away = False
+
     def close(self) -> None:
         """Hang up and stop listening."""
         self._hang_up()
@@ -111,7 +121,9 @@ class TcpPort:
         # A client may be gone again before it is accepted.
         with suppress(OSError):
             client, (host, port, *_) = self._listener.accept()
-            if self._client is None:
+            if self._is_away:
+                client.close()
+            elif self._client is None:
                 _prepare(client)
                 self._client = client
             else:

@@ -20,9 +20,11 @@ def open_port(url: str, profile: Profile) -> ReopenablePort:
 
     if _STAND_IN_PACKAGE not in serial.protocol_handler_packages:
         serial.protocol_handler_packages.append(_STAND_IN_PACKAGE)
-    times = {"timeout": profile.serial.timeout_s, "write_timeout": profile.serial.timeout_s}
+    timeout_s = profile.serial.timeout_s
     try:
-        return serial.serial_for_url(url, baudrate=profile.serial.baud or 9600, **times)
+        return serial.serial_for_url(
+            url, baudrate=profile.serial.baud or 9600, timeout=timeout_s, write_timeout=timeout_s
+        )
     except (OSError, ValueError) as error:
         raise SessionError(f"cannot open {url}: {error}; check the name, the rights and the table") from error
 

@@ -179,13 +179,13 @@ def _value(wanted: object, value: object, where: str) -> object:
         if not isinstance(value, wanted):
             raise ProfileError(f"{where} is {value!r}; it must be {'true or false' if wanted is bool else 'a text'}")
         return value
-    if wanted in {int, float}:
-        is_number = isinstance(value, int if wanted is int else int | float) and not isinstance(value, bool)
-        if not is_number or not (0 <= value < math.inf):  # type: ignore[operator]  # a number by now
+    if wanted is int or wanted is float:
+        kinds = (int,) if wanted is int else (int, float)
+        if not isinstance(value, kinds) or isinstance(value, bool) or not 0 <= value < math.inf:
             raise ProfileError(
                 f"{where} is {value!r}; it must be a {'whole number' if wanted is int else 'number'} from 0 up"
             )
-        return wanted(value)  # type: ignore[operator]  # int or float
+        return wanted(value)
     if not isinstance(value, list | tuple) or not all(isinstance(word, str) for word in value):
         raise ProfileError(f"{where} is {value!r}; it must be a list of words")
     return tuple(value)

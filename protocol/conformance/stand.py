@@ -8,6 +8,7 @@ import json
 import socket
 import subprocess
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -106,7 +107,7 @@ class ControlChannel:
 
     def preset(self, count: int) -> None:
         """Switch the table off and on, with its counter at `count`."""
-        self._request("reset", count=count)
+        self._request("preset", count=count)
 
     def _request(self, command: str, **parameters: float) -> None:
         request = json.dumps({"command": command, **parameters}).encode() + b"\n"
@@ -193,4 +194,6 @@ def capabilities(stand: Stand, profile: Profile) -> frozenset[str]:
         found.add(DISCONNECT)
     if profile.serial.baud:
         found.add(PACING)
+    if find_spec("hypothesis"):
+        found.add(RANDOM_SEARCH)
     return stand.capabilities | found

@@ -19,7 +19,7 @@ DEFAULTS = tomllib.loads(DEFAULT_FILE.read_text(encoding="utf-8"))
 def leaves(section: Any, where: str = "") -> dict[str, Any]:  # noqa: ANN401  # a table of TOML, or a section's value
     """Return each number of a section under its dotted key."""
     if is_dataclass(section):
-        section = {entry.name: getattr(section, entry.name) for entry in fields(section)}
+        section = {entry.name: getattr(section, entry.name) for entry in fields(section) if entry.name != "faults"}
     found: dict[str, Any] = {}
     for key, value in section.items():
         deeper = isinstance(value, dict) or is_dataclass(value)

@@ -13,6 +13,7 @@ import pytest
 from emulator.config import load_config
 from emulator.control import COMMANDS, LONGEST_REQUEST, ControlSocket, answer
 from emulator.control_client import ControlError, main, request
+from emulator.faults import Fault
 from emulator.status import TableStatus
 from emulator.table import Table
 
@@ -41,6 +42,15 @@ class QuietStand:
 
     def reset(self) -> None:
         self.done.append("reset")
+
+    def preset(self, count: int) -> None:
+        self.done.append(count)
+
+    def inject(self, fault: Fault) -> None:
+        self.done.append(fault.kind)
+
+    def clear_faults(self) -> None:
+        self.done.append("clear-faults")
 
     def quit(self) -> None:
         self.done.append("quit")
