@@ -38,25 +38,31 @@ def sample_at_or_above(position: float) -> int:
 
 
 @kernel
+def wrapped(sample: int, count: int) -> int:
+    """Return `sample` modulo `count`: without an integer division, the slowest operation of a look-up."""
+    return int(sample - count * np.floor((sample + 0.5) * (1.0 / count)))
+
+
+@kernel
 def column_value(values: FloatArray, epsilon: float, location: int, angle_deg: float) -> float:
     """Return f_R at a scan location and any (unwrapped) table angle; 0 where it is forbidden.
 
     Linear between the two neighbouring samples, and 0 unless each of them that has a weight exceeds `epsilon`.
     """
     count: int = values.shape[1]
-    position = angle_deg * count / 360.0
+    position = angle_deg * (count / 360.0)
     below = sample_at_or_below(position)
-    above = sample_at_or_above(position)
-    index = below % count
+    fraction = position - below
+    index = wrapped(below, count)
     lower = float(values[location, index])
     if lower <= epsilon:
         return 0.0
-    if below >= above:
+    if fraction <= SAMPLE_TOLERANCE:
         return lower
     upper = float(values[location, index + 1 if index + 1 < count else 0])
     if upper <= epsilon:
         return 0.0
-    return lower + (position - below) * (upper - lower)
+    return lower + fraction * (upper - lower)
 
 
 @kernel

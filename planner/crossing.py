@@ -9,7 +9,7 @@ the one at or above `highest`.
 import numpy as np
 import numpy.typing as npt
 
-from planner.config_map import BoolArray, sample_at_or_above, sample_at_or_below
+from planner.config_map import BoolArray, sample_at_or_above, sample_at_or_below, wrapped
 from planner.kernel import kernel
 from planner.motion import swept_angles
 
@@ -42,9 +42,9 @@ def free_runs(allowed: BoolArray) -> RunArray:
 def crossing_is_allowed(runs: RunArray, step: int, lowest_deg: float, highest_deg: float) -> bool:
     """Tell whether the angles from `lowest_deg` to `highest_deg` are allowed all the way through one step."""
     count = runs.shape[1]
-    first = sample_at_or_below(lowest_deg * count / 360.0)
-    last = sample_at_or_above(highest_deg * count / 360.0)
-    return bool(runs[step, first % count] > last - first)
+    first = sample_at_or_below(lowest_deg * (count / 360.0))
+    last = sample_at_or_above(highest_deg * (count / 360.0))
+    return bool(runs[step, wrapped(first, count)] > last - first)
 
 
 @kernel

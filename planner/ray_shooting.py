@@ -97,9 +97,8 @@ def _algorithm_2(
     angles, speeds = np.empty(steps + 1), np.empty(steps + 1)
     chosen, paused = np.zeros(steps), np.zeros(steps)
     angles[0], speeds[0] = angle_deg, speed_deg_s
-    best = 0
     for k in range(steps):
-        best = cheapest_ray(terms, accelerations, k, horizon, to_go, angles[k], speeds[k], best)
+        best = cheapest_ray(terms, accelerations, k, horizon, to_go, angles[k], speeds[k])
         a = limited_acceleration(speeds[k], accelerations[best], terms.step_s, terms.speed_limit_deg_s)
         if step_is_allowed(terms.runs, k, angles[k], speeds[k], a, terms.step_s):
             chosen[k] = a
@@ -121,18 +120,13 @@ def cheapest_ray(
     to_go: CostToGo,
     angle_deg: float,
     speed_deg_s: float,
-    likely: int = 0,
 ) -> int:
-    """Return the index of the ray from this state that costs least; the first of equal ones.
-
-    The ray of index `likely` is followed first: when it is good, the others are soon seen to cost more.
-    """
+    """Return the index of the ray from this state that costs least; the first of equal ones."""
     last = min(column + horizon, len(terms.values) - 1)
-    best = likely
-    least = ray_cost(terms, accelerations[best], column, last, to_go, angle_deg, speed_deg_s, np.inf)
+    best, least = 0, np.inf
     for i in range(len(accelerations)):
         cost = ray_cost(terms, accelerations[i], column, last, to_go, angle_deg, speed_deg_s, least)
-        if cost < least or (cost == least and i < best):
+        if cost < least:
             best, least = i, cost
     return best
 
@@ -152,7 +146,7 @@ def ray_cost(
 
     Once it leaves the allowed region, at a column or between two, each remaining step costs C_pen: those to `last`, or
     to the end of the map where a cost-to-go accounts for them. The speed saturates at its limit. No term is negative,
-    so a ray that already costs more than `bound` is not followed further.
+    so a ray that already costs `bound` is not followed further.
     """
     cost = 0.0
     for k in range(column, last):
@@ -165,7 +159,7 @@ def ray_cost(
         cost += acceleration_cost(terms.acceleration_weight, a)
         cost += speed_cost(terms.speed_weight, speed_deg_s)
         cost += value_cost(value)
-        if cost > bound:
+        if cost >= bound:
             return cost
     if len(to_go.costs) == 0:
         return cost
