@@ -58,7 +58,8 @@ def build_maps(
         problem: The cell, the path, the value function.
         configurations: Which ones.
         n_angles: Number of table angles over one turn.
-        progress: Called with the locations done and all of them, between blocks; what it raises ends the work.
+        progress: Called with the locations done and all of them, before and after each block; what it raises ends
+            the work.
 
     Raises:
         ValueError: A user's factor gave a wrong shape, or something else than numbers in 0..1; or there are more user
@@ -72,6 +73,8 @@ def build_maps(
     values, reasons = np.empty(shape), np.empty(shape, dtype=np.uint8)
     cells = _cells(problem, configurations, n_angles)
     block = max(1, _BLOCK_CELLS // n_angles)
+    if progress is not None:
+        progress(0, n_locations)
     for first in range(0, n_locations, block):
         last = min(first + block, n_locations)
         window = values[:, first:last], reasons[:, first:last]
