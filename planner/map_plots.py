@@ -165,7 +165,7 @@ def _legend(figure: Figure, legend: list[LegendEntry]) -> None:
         return
     figure.legend(
         [Patch(facecolor=entry.colour) for entry in legend],
-        [f"{entry.text} ({entry.share:.1%})" for entry in legend],
+        [f"{entry.text} ({_percent(entry.share)})" for entry in legend],
         loc="outside lower center",
         ncols=min(_LEGEND_COLUMNS, len(legend)),
         frameon=False,
@@ -174,6 +174,10 @@ def _legend(figure: Figure, legend: list[LegendEntry]) -> None:
         title_fontsize=9,
         labelcolor=_INK,
     )
+
+
+def _percent(share: float) -> str:
+    return f"{share:.1%}" if share >= 0.001 else "< 0.1%"
 
 
 def _save(figure: Figure, file: Path) -> None:
