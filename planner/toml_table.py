@@ -45,9 +45,9 @@ class TomlTable:
             return ScanFileError(f"{self.file}: {self._prefix}{key} is missing; it must be {allowed}")
         return ScanFileError(f"{self.file}: {self._prefix}{key} is {self._values[key]!r}; it must be {allowed}")
 
-    def _take(self, key: str) -> Any:  # noqa: ANN401 - a TOML value has any type until it is checked
+    def _take(self, key: str, default: object = None) -> Any:  # noqa: ANN401 - any type until it is checked
         self._read.add(key)
-        return self._values.get(key)
+        return self._values.get(key, default)
 
     def number(
         self,
@@ -59,50 +59,43 @@ class TomlTable:
         at_most: float = math.inf,
     ) -> float:
         """Return the finite number `key` in (above, at_most] and [at_least, at_most]; required without a default."""
-        value = self._take(key)
-        if value is None and default is not None and key not in self._values:
-            return default
+        value = self._take(key, default)
         if not _is_number(value) or not (value > above and at_least <= value <= at_most):
             raise self.refuse(key, _range_text(above, at_least, at_most))
         return float(value)
 
     def count(self, key: str, default: int, *, at_least: int, at_most: int) -> int:
         """Return the whole number `key` in [at_least, at_most]."""
-        value = self._take(key) if key in self._values else default
+        value = self._take(key, default)
         if isinstance(value, bool) or not isinstance(value, int) or not at_least <= value <= at_most:
             raise self.refuse(key, f"a whole number from {at_least} to {at_most}")
         return value
 
     def numbers(self, key: str, count: int, default: Sequence[float] | None = None) -> tuple[float, ...]:
         """Return the list `key` of `count` finite numbers; required without a default."""
-        value = self._take(key)
-        if value is None and default is not None and key not in self._values:
-            return tuple(default)
-        if not isinstance(value, list) or len(value) != count or not all(_is_number(item) for item in value):
+        value = self._take(key, default)
+        is_list = isinstance(value, list | tuple) and len(value) == count
+        if not is_list or not all(map(_is_number, value)):
             raise self.refuse(key, f"a list of {count} finite numbers")
-        return tuple(float(item) for item in value)
+        return tuple(map(float, value))
 
     def text(self, key: str, default: str | None = None) -> str:
         """Return the text `key`; required without a default."""
-        value = self._take(key)
-        if value is None and default is not None and key not in self._values:
-            return default
+        value = self._take(key, default)
         if not isinstance(value, str) or not value:
             raise self.refuse(key, "a text")
         return value
 
     def choice(self, key: str, choices: Sequence[str], default: str | None = None) -> str:
         """Return the text `key`, which is one of `choices`; required without a default."""
-        value = self._take(key)
-        if value is None and default is not None and key not in self._values:
-            return default
+        value = self._take(key, default)
         if value not in choices:
             raise self.refuse(key, "one of " + ", ".join(choices))
         return str(value)
 
     def table(self, key: str) -> "TomlTable":
         """Return the table `key`; an absent one is empty."""
-        value = self._take(key) if key in self._values else {}
+        value = self._take(key, {})
         if not isinstance(value, dict):
             raise self.refuse(key, "a table")
         return TomlTable(self.file, value, f"{self._prefix}{key}.")
