@@ -290,3 +290,10 @@ def _check_registers(config: TableConfig, source: str) -> None:
             raise ConfigError(
                 f"{source}: {name} is {value:g}; with this encoder and tick the firmware holds {least:g} to {most:g}"
             )
+    from emulator.pid import fixed_gains  # noqa: PLC0415  # pid takes the types of this file
+
+    for name in ("ramp", "hold"):
+        try:
+            fixed_gains(config, getattr(config.gains, name))
+        except ConfigError as error:
+            raise ConfigError(f"{source}: gains.{name}: {error}") from None

@@ -126,3 +126,10 @@ def test_serial_settings_are_changed_by_name_and_none_keeps_them() -> None:
 
 def test_the_default_table_has_512_counts_a_degree() -> None:
     assert load_config().counts_per_turn == 360 * 512
+
+
+def test_a_gain_that_no_register_holds_is_refused_with_file_and_key(tmp_path: Path) -> None:
+    file = tmp_path / "table.toml"
+    file.write_text("[gains.ramp]\nproportional_duty_s_deg = 1e6\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"table\.toml: gains\.ramp: .* does not fit the firmware"):
+        load_config(file)
