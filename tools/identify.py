@@ -1,7 +1,7 @@
 """Identify a table: record the right motion over a port, and estimate the constants from a recording.
 
-    python -m tools.identify record --port emulator:// --out trace.csv
-    python -m tools.identify fit trace.csv --out table.toml
+python -m tools.identify record --port emulator:// --out trace.csv
+python -m tools.identify fit trace.csv --out table.toml
 """
 
 import argparse
@@ -61,7 +61,9 @@ def _fit(options: argparse.Namespace) -> int:
     print("\n".join(map(verdict, found.constants)))
     untold = [constant.name for constant in found.constants if constant.name in _NEEDED and not constant.told]
     if untold:
-        raise RecordingError(f"{options.recording}: cannot tell {', '.join(untold)}: too short, or too little excitation")
+        raise RecordingError(
+            f"{options.recording}: cannot tell {', '.join(untold)}: too short, or too little excitation"
+        )
     write_whole(options.out, table_toml(found))
     report = options.out.with_suffix(".html")
     write_whole(report, fit_report(found, config, str(options.recording)))
@@ -74,19 +76,25 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m tools.identify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     commands = parser.add_subparsers(required=True)
-    recorder = commands.add_parser("record", help="move a table and record its answers (it turns about half a turn each way)")
+    recorder = commands.add_parser(
+        "record", help="move a table and record its answers (it turns about half a turn each way)"
+    )
     recorder.add_argument("--port", required=True, metavar="URL", help="/dev/ttyUSB0, socket://host:7000, emulator://")
     recorder.add_argument("--out", required=True, type=Path, metavar="FILE", help="the CSV to write")
     recorder.add_argument("--baud", type=int, default=9600)
     recorder.add_argument("--duration", type=float, default=60.0, metavar="S", help="length of the recording (60)")
     recorder.add_argument("--speed", type=float, default=40.0, metavar="DEG_S", help="the greatest to use (40)")
-    recorder.add_argument("--acceleration", type=float, default=100.0, metavar="DEG_S2", help="the greatest to use (100)")
+    recorder.add_argument(
+        "--acceleration", type=float, default=100.0, metavar="DEG_S2", help="the greatest to use (100)"
+    )
     recorder.add_argument("--seed", type=int, default=0, help="of the irregular durations")
     recorder.set_defaults(run=_record)
     fitter = commands.add_parser("fit", help="estimate the constants of the recorded table")
     fitter.add_argument("recording", type=Path, help="a CSV of `record`, of the emulator's trace, or of a drive")
     fitter.add_argument("--out", required=True, type=Path, metavar="FILE", help="the TOML to write; a report beside it")
-    fitter.add_argument("--config", type=Path, help="what is known of the table: gains, encoder, datasheet (the default table)")
+    fitter.add_argument(
+        "--config", type=Path, help="what is known of the table: gains, encoder, datasheet (the default table)"
+    )
     fitter.add_argument("--seed", type=int, default=0, help="of the search")
     fitter.set_defaults(run=_fit)
     return parser

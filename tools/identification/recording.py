@@ -61,12 +61,16 @@ class DriveRecording(NamedTuple):
 def write_recording(path: Path, recording: WireRecording) -> None:
     """Write a recording; the file appears under its name when it is complete."""
     rows = [(sent.time_s, f"{sent.verb} {sent.value}", "") for sent in recording.commands]
-    rows += [(float(time_s), "H", str(angle)) for time_s, angle in zip(recording.time_s, recording.position_deg, strict=True)]
+    rows += [
+        (float(time_s), "H", str(angle)) for time_s, angle in zip(recording.time_s, recording.position_deg, strict=True)
+    ]
     partial = path.with_name(path.name + ".part")
     with partial.open("w", encoding="ascii", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
-        writer.writerows((f"{time_s:.6f}", command, angle) for time_s, command, angle in sorted(rows, key=lambda row: row[0]))
+        writer.writerows(
+            (f"{time_s:.6f}", command, angle) for time_s, command, angle in sorted(rows, key=lambda row: row[0])
+        )
     partial.replace(path)
 
 

@@ -78,7 +78,9 @@ def _check_against_commands(config: TableConfig, recording: WireRecording) -> No
     _check_gaps(recording.time_s)
     motions = commanded_motions(config, recording)
     if not len(motions):
-        raise RecordingError("the recording has no P or R command; the duty follows from the commands, so they are needed")
+        raise RecordingError(
+            "the recording has no P or R command; the duty follows from the commands, so they are needed"
+        )
     foretold = wire_positions_deg(config, recording, motions, 0.0)
     seen = recording.position_deg - recording.position_deg[0]
     _check_stall(recording.time_s, seen, foretold)
@@ -99,12 +101,16 @@ def _check_stall(time_s: Array, seen_deg: Array, foretold_deg: Array) -> None:
     stalled = stands & should_move & (time_s - time_s[0] > _STALL_S)
     if stalled.any():
         at = int(np.argmax(stalled))
-        raise RecordingError(f"the table stands still for {_STALL_S:g} s before {time_s[at]:.2f} s though it was sent: a stall")
+        raise RecordingError(
+            f"the table stands still for {_STALL_S:g} s before {time_s[at]:.2f} s though it was sent: a stall"
+        )
 
 
 def _check_duty(config: TableConfig, recording: DriveRecording) -> None:
     if np.abs(recording.duty).max() > 1.0:
-        raise RecordingError(f"the duty reaches {np.abs(recording.duty).max():.4g}; it must be within -1..1 (percent, or volts?)")
+        raise RecordingError(
+            f"the duty reaches {np.abs(recording.duty).max():.4g}; it must be within -1..1 (percent, or volts?)"
+        )
     duty, position_deg = ticks_of(recording, config.control.tick_hz)
     driven = np.abs(duty) > config.protection.stall_duty
     window = round(config.protection.stall_time_s * config.control.tick_hz)
@@ -115,4 +121,6 @@ def _check_duty(config: TableConfig, recording: DriveRecording) -> None:
         at_s = stalls[0] / config.control.tick_hz
         raise RecordingError(f"the motor is driven hard but stands still at {at_s:.2f} s: a stall")
     if np.abs(np.diff(np.sign(duty[duty != 0.0]))).sum() == 0.0:
-        raise RecordingError("the duty never changes its sign; without reversals neither friction nor backlash can be told")
+        raise RecordingError(
+            "the duty never changes its sign; without reversals neither friction nor backlash can be told"
+        )

@@ -35,7 +35,9 @@ def commanded_motions(config: TableConfig, recording: WireRecording) -> NDArray[
             acceleration = value
         else:
             angle_deg = value if verb == "R" else value - start_deg
-            carried_out_s = ceil(time_s * tick_hz - 1e-3) / tick_hz  # at the end of the tick in which the line was complete
+            carried_out_s = (
+                ceil(time_s * tick_hz - 1e-3) / tick_hz
+            )  # at the end of the tick in which the line was complete
             motions.append(Motion(carried_out_s, angle_deg, speed, acceleration, by=verb == "R"))
     return motion_rows(config, motions)
 

@@ -39,7 +39,7 @@ class Limits(NamedTuple):
     sensitivity_peak: float = 1.7
     gain_margin_db: float = 8.0
     phase_margin_deg: float = 40.0
-    noise_duty: float = 0.005
+    noise_duty: float = 0.004
     bandwidth_hz: float = 10.0
     overshoot: float = 0.10
 

@@ -5,12 +5,12 @@ All on one grid of the discrete Fourier transform, so that a closed loop's answe
 
 from typing import NamedTuple
 
-import control
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
 
 from emulator.config import TableConfig
-from tools.tuning.linear_model import Teeth, plant
+from tools.tuning.linear_model import Teeth, load_ratio, motor_system
 
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
@@ -39,21 +39,37 @@ def grid_hz(config: TableConfig, size: int = GRID_SIZE) -> Array:
 
 
 def plant_response(configs: list[TableConfig], teeth: Teeth, z: Complex) -> PlantResponse:
-    """Return the responses of many plants at once; shape (plants, frequencies)."""
-    systems = [plant(config, teeth) for config in configs]
-    responses = np.array([_response(system, z) for system in systems])
-    buffered = responses[..., 0] / z
-    return PlantResponse(buffered[:, 1], buffered[:, 0], responses[:, 1, :, 1], responses[:, 0, :, 1])
+    """Return the responses of many plants at once; shape (plants, frequencies).
+
+    It is `linear_model.plant` written out, for a thousand plants: motor and load with a zero-order hold by one stacked
+    matrix exponential, the window as a sum of delays.
+    """
+    control = configs[0].control
+    held = expm(np.array([_held_system(config, teeth) for config in configs]) / control.tick_hz)
+    motor, inputs = held[:, :2, :2], held[:, :2, 3:]
+    states = _resolvent(motor, z) @ inputs[:, None]  # (plants, frequencies, states, inputs)
+    turned = held[:, None, 2:3, :2] @ states + held[:, None, 2:3, 3:]  # the angle made in a tick
+    window = control.speed_window_ticks
+    mean = (z[:, None] ** -np.arange(1, window + 1)).sum(axis=1) * control.tick_hz / window
+    table_deg = np.degrees(1.0 / np.array([config.gears.ratio for config in configs]))[:, None]
+    speed, measured = table_deg[..., None] * states[..., 1, :], (table_deg * mean)[..., None] * turned[..., 0, :]
+    return PlantResponse(measured[..., 0] / z, speed[..., 0] / z, measured[..., 1], speed[..., 1])
 
 
-def _response(system: control.StateSpace, z: Complex) -> Complex:
-    """Return the response (outputs, frequencies, inputs); the window's delays are solved by hand, being a chain."""
-    motor, angle = slice(0, 2), 2
-    inputs = np.broadcast_to(system.B[motor].astype(complex), (len(z), 2, 2))
-    states = np.linalg.solve(z[:, None, None] * np.eye(2) - system.A[motor, motor], inputs)
-    made = (system.A[angle, motor] @ states + system.B[angle]) / z[:, None]
-    window = system.nstates - 2
-    mean = (z[:, None] ** -np.arange(window)).sum(axis=1)
-    speed = system.C[0, motor] @ states
-    measured = system.C[1, angle] * mean[:, None] * made
-    return np.array([speed, measured])
+def _held_system(config: TableConfig, teeth: Teeth) -> Array:
+    """Return the motor's continuous system, bordered by its held inputs duty and load, which do not change."""
+    a, b = motor_system(config, teeth)
+    bordered = np.zeros((5, 5))
+    bordered[:3, :3] = a
+    bordered[:3, 3:] = b @ np.diag([config.driver.supply_V, load_ratio(config, teeth)])
+    return bordered
+
+
+def _resolvent(a: Array, z: Complex) -> Complex:
+    """Return (z I - A)^-1 of 2x2 matrices by Cramer's rule; shape (plants, frequencies, 2, 2)."""
+    trace, determinant = np.trace(a, axis1=1, axis2=2), np.linalg.det(a)
+    adjugate = np.trace(a, axis1=1, axis2=2)[:, None, None] * np.eye(2) - a
+    numerator = z[:, None, None] * np.eye(2) - adjugate[:, None]
+    denominator = z**2 - trace[:, None] * z + determinant[:, None]
+    result: Complex = numerator / denominator[..., None, None]
+    return result

@@ -90,7 +90,9 @@ def _registers(loops: Loops, points: Array) -> Array:
     steps = duty_s_deg * duty_max(config) * speed_quantum_deg_s(config)
     integral = steps * tick_s / np.exp(points[:, 1])
     derivative = steps * np.maximum(points[:, 2], 0.0) * config.control.speed_window_ticks
-    scaled = np.stack([steps * 2.0**GAIN_BITS, integral * 2.0**INTEGRAL_GAIN_BITS, derivative * 2.0**GAIN_BITS], axis=-1)
+    scaled = np.stack(
+        [steps * 2.0**GAIN_BITS, integral * 2.0**INTEGRAL_GAIN_BITS, derivative * 2.0**GAIN_BITS], axis=-1
+    )
     least = np.array([0.0, 1.0, 0.0])
     result: Array = np.clip(np.round(scaled), least, INT32_MAX)
     return result

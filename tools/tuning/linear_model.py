@@ -44,20 +44,12 @@ def inertia_kg_m2(config: TableConfig, teeth: Teeth) -> float:
     return config.motor.rotor_inertia_kg_m2 + config.gears.inertia_kg_m2 + table
 
 
-def motor(config: TableConfig, teeth: Teeth) -> control.StateSpace:
-    """Return the motor in continuous time: current, speed, angle from voltage (V) and resisting torque (Nm)."""
+def motor_system(config: TableConfig, teeth: Teeth) -> tuple[Array, Array]:
+    """Return A and B of the motor: current, speed, angle, driven by voltage (V) and resisting torque (Nm)."""
     r, l, k = config.motor.resistance_ohm, config.motor.inductance_H, config.motor.torque_constant_Nm_A  # noqa: E741  # L
     j, b = inertia_kg_m2(config, teeth), config.friction.viscous_Nm_s
-    states = ["current_A", "speed_rad_s", "angle_rad"]
-    return control.ss(
-        [[-r / l, -k / l, 0.0], [k / j, -b / j, 0.0], [0.0, 1.0, 0.0]],
-        [[1.0 / l, 0.0], [0.0, -1.0 / j], [0.0, 0.0]],
-        np.eye(3),
-        np.zeros((3, 2)),
-        inputs=["voltage_V", "torque_Nm"],
-        outputs=states,
-        states=states,
-    )
+    a = np.array([[-r / l, -k / l, 0.0], [k / j, -b / j, 0.0], [0.0, 1.0, 0.0]])
+    return a, np.array([[1.0 / l, 0.0], [0.0, -1.0 / j], [0.0, 0.0]])
 
 
 def plant(config: TableConfig, teeth: Teeth) -> control.StateSpace:
@@ -68,7 +60,8 @@ def plant(config: TableConfig, teeth: Teeth) -> control.StateSpace:
     the angle made in each of the last W ticks; as these are kept, and no angle, nothing integrates without end.
     """
     tick_s, window = 1.0 / config.control.tick_hz, config.control.speed_window_ticks
-    held = control.sample_system(motor(config, teeth), tick_s, method="zoh")
+    motor = control.ss(*motor_system(config, teeth), np.eye(3), np.zeros((3, 2)))
+    held = control.sample_system(motor, tick_s, method="zoh")
     inputs = np.diag([config.driver.supply_V, load_ratio(config, teeth)])
     size = 2 + window
     a, b = np.zeros((size, size)), np.zeros((size, 2))

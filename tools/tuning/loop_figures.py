@@ -53,10 +53,13 @@ def loop_figures(loops: Loops, registers: Array) -> LoopFigures:
     gains = duty_gains(config, registers)
     regulator = controller(gains, z)
     window_ticks, tick_hz = config.control.speed_window_ticks, config.control.tick_hz
-    per_state = [margins(regulator.by_measured * plant.measured_by_duty, loops.frequency_hz) for plant in loops.plants.values()]
+    per_state = [
+        margins(regulator.by_measured * plant.measured_by_duty, loops.frequency_hz) for plant in loops.plants.values()
+    ]
     count_deg, _ = quantisation_noise(config)
     noises = [
-        noise_duty(regulator, plant, count_deg, window_ticks / tick_hz, window_ticks, z) for plant in loops.plants.values()
+        noise_duty(regulator, plant, count_deg, window_ticks / tick_hz, window_ticks, z)
+        for plant in loops.plants.values()
     ]
     plant = loops.plants[Teeth.DRIVING]
     sensitivity = 1.0 / (1.0 + regulator.by_measured * plant.measured_by_duty)

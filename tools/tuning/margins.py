@@ -83,7 +83,9 @@ def _crossing(a: Array, b: Array) -> Array:
     return np.clip(-a / np.where(change == 0.0, 1.0, change), 0.0, 1.0)
 
 
-def noise_duty(control: Controller, plant: PlantResponse, count_deg: float, window_s: float, window_ticks: int, z: Complex) -> Array:
+def noise_duty(
+    control: Controller, plant: PlantResponse, count_deg: float, window_s: float, window_ticks: int, z: Complex
+) -> Array:
     """Return the standard deviation of the duty that the rounding of the position to counts causes.
 
     The noise enters as the difference of two counts over the window. Parseval: the variance is the mean over all

@@ -1,0 +1,125 @@
+"""Tune the two gain sets from the table's model, within stated margins, and check them on the emulator.
+
+    python -m tools.tune --out build/tune
+    python -m tools.tune --config table.toml --ms 1.6 --noise 0.3 --out build/tune
+
+Writes gains.toml (for `python -m emulator --config`), gains.h, report.html and its plots.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from emulator.config import ConfigError, load_config
+from tools.html_report import write_whole
+from tools.progress import Progress
+from tools.tuning.bounds import Limits
+from tools.tuning.gain_files import gains_header, gains_toml
+from tools.tuning.tune_report import plots, tune_report
+from tools.tuning.tuned_table import Tuning, TuningError, tune
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line; return its exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        config = load_config(options.config)
+        limits = _limits(options)
+        with Progress("tuning") as progress:
+            tuning = tune(config, limits, options.plants, options.spread / 100.0, options.seed, progress.show)
+        _write(options.out, tuning)
+    except (ConfigError, TuningError, OSError) as error:
+        print(f"tune: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("tune: interrupted", file=sys.stderr)
+        return 130
+    _print(tuning)
+    return 0
+
+
+def _limits(options: argparse.Namespace) -> Limits:
+    if options.ms <= 1.0:
+        raise TuningError(f"--ms is {options.ms:g}; it must be greater than 1")
+    for name in ("gain_margin", "phase_margin", "noise", "bandwidth", "overshoot"):
+        if getattr(options, name) <= 0.0:
+            raise TuningError(f"--{name.replace('_', '-')} is {getattr(options, name):g}; it must be greater than 0")
+    if options.plants < 1 or not 0.0 <= options.spread < 100.0:
+        raise TuningError("--plants must be at least 1, --spread within 0..100 %")
+    return Limits(
+        options.ms,
+        options.gain_margin,
+        options.phase_margin,
+        options.noise / 100.0,
+        options.bandwidth,
+        options.overshoot / 100.0,
+    )
+
+
+def _write(folder: Path, tuning: Tuning) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    sets = {name: getattr(tuning.after.gains, name) for name in tuning.sets}
+    write_whole(folder / "gains.toml", gains_toml(sets))
+    write_whole(folder / "gains.h", gains_header({name: tuned.design.gains for name, tuned in tuning.sets.items()}))
+    drawings = plots(tuning)
+    for name, drawing in drawings.items():
+        write_whole(folder / f"{name}.svg", drawing)
+    write_whole(folder / "report.html", tune_report(tuning, drawings))
+    print(f"wrote gains.toml, gains.h, report.html and plots to {folder}", file=sys.stderr)
+
+
+def _print(tuning: Tuning) -> None:
+    for name, tuned in tuning.sets.items():
+        gains = getattr(tuning.after.gains, name)
+        print(
+            f"{tuned.title}: K {gains.proportional_duty_s_deg:.5f} duty s/deg, Ti {1e3 * gains.integral_time_s:.3f} ms, "
+            f"Td {1e3 * gains.derivative_time_s:.3f} ms; bounded by {', '.join(map(str, tuned.design.binding)) or 'nothing'}; "
+            f"{100 * tuned.spread.all_share:.0f} % of the spread plants meet all bounds"
+        )
+    for before, after in tuning.checks:
+        for old, new in zip(before.figures, after.figures, strict=True):
+            foretold = "" if new.model is None else f" (model {new.model:.3g})"
+            print(f"{new.title}: {old.emulator:.3g} -> {new.emulator:.3g} {new.unit}{foretold}")
+
+
+def _parser() -> argparse.ArgumentParser:
+    defaults = Limits()
+    parser = argparse.ArgumentParser(
+        prog="python -m tools.tune", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--config", type=Path, help="TOML with the table's constants that differ from the default ones")
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR")
+    parser.add_argument("--ms", type=float, default=defaults.sensitivity_peak, help="the greatest Ms (%(default)s)")
+    parser.add_argument(
+        "--gain-margin", type=float, default=defaults.gain_margin_db, metavar="DB", help="the least (%(default)s)"
+    )
+    parser.add_argument(
+        "--phase-margin", type=float, default=defaults.phase_margin_deg, metavar="DEG", help="the least (%(default)s)"
+    )
+    parser.add_argument(
+        "--noise",
+        type=float,
+        default=100.0 * defaults.noise_duty,
+        metavar="PERCENT",
+        help="the most noise at the PWM, in percent of full duty (%(default)s)",
+    )
+    parser.add_argument(
+        "--bandwidth", type=float, default=defaults.bandwidth_hz, metavar="HZ", help="the least, -3 dB (%(default)s)"
+    )
+    parser.add_argument(
+        "--overshoot",
+        type=float,
+        default=100.0 * defaults.overshoot,
+        metavar="PERCENT",
+        help="the most after a step, of the constant-speed set (%(default)s)",
+    )
+    parser.add_argument("--plants", type=int, default=1000, metavar="N", help="of the Monte Carlo (%(default)s)")
+    parser.add_argument(
+        "--spread", type=float, default=20.0, metavar="PERCENT", help="of the plants' constants (%(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the Monte Carlo and the runs (%(default)s)")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

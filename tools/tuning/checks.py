@@ -1,0 +1,217 @@
+"""Checks of gain sets on the compiled emulator, each beside what the linear model foretells."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import control
+import numpy as np
+
+from emulator.config import TableConfig
+from emulator.firmware import IDLE
+from emulator.pid import fixed_gains
+from tools.emulated import Answer, Array, Load, Motion, emulate
+from tools.tuning.linear_model import Teeth, closed_loop, moving_friction_Nm
+
+LOAD_STEP_Nm = 0.29
+_STEP_FROM_DEG_S, _STEP_TO_DEG_S = 10.0, 15.0
+_SUDDEN_DEG_S2 = 25_000.0
+_SETTLED_SHARE = 0.1
+_SMALL_MOVES_DEG = (0.1, 0.2, 0.5, 1.0, 3.0)
+_CREEP_DEG_S = 0.2
+_STARTS = 24
+"""Places between two counts from which steps are made; their mean shows the answer without the counts' ripple."""
+
+
+class Curve(NamedTuple):
+    """An answer in time: of the emulator, and where the linear model has one, of that."""
+
+    time_s: Array
+    emulator: Array
+    model: Array | None
+
+
+class Figure(NamedTuple):
+    """One figure of merit, the less the better."""
+
+    title: str
+    unit: str
+    emulator: float
+    model: float | None
+
+
+class Check(NamedTuple):
+    """A run and what it shows."""
+
+    name: str
+    ordinate: str
+    curve: Curve
+    figures: tuple[Figure, ...]
+
+
+def all_checks(config: TableConfig, seed: int) -> list[Check]:
+    """Return all checks of a table with its gain sets."""
+    checks: list[Callable[[TableConfig, int], Check]] = [ramp, step, load_step, small_moves, reversal, creep]
+    return [check(config, seed) for check in checks]
+
+
+def ramp(config: TableConfig, seed: int) -> Check:
+    """Speed up at the greatest acceleration to half the greatest speed, and keep it."""
+    acceleration, speed = config.limits.acceleration_deg_s2, config.limits.speed_deg_s / 2.0
+    start_s, ramp_s = 0.1, speed / acceleration
+    answer = emulate(config, [Motion(start_s, 1000.0, speed, acceleration)], start_s + ramp_s + 0.5, seed=seed)
+    reference = answer.reference_speed_deg_s
+    gains = fixed_gains(config, config.gains.ramp)
+    loop = closed_loop(config, Teeth.DRIVING, gains)
+    moving = (answer.time_s > start_s).astype(float)
+    outputs = _linear(loop, answer.time_s, reference, moving_friction_Nm(config) * moving)
+    error, foretold = reference - answer.measured_deg_s, reference - outputs[1]
+    late = (answer.time_s > start_s + 0.5 * ramp_s) & (answer.time_s <= start_s + ramp_s)
+    steady = answer.time_s > start_s + ramp_s + 0.3
+    lag = answer.reference_deg - answer.encoder_deg
+    linear_lag = np.cumsum(reference - outputs[0]) / config.control.tick_hz
+    return Check(
+        "ramp",
+        "speed error, deg/s",
+        Curve(answer.time_s, error, foretold),
+        (
+            Figure(f"speed lag on a ramp of {acceleration:g} deg/s2", "deg/s", *_means(error, foretold, late)),
+            Figure(f"encoder behind the reference at {speed:g} deg/s", "deg", *_means(lag, linear_lag, steady)),
+        ),
+    )
+
+
+def step(config: TableConfig, seed: int) -> Check:
+    """Let the reference jump from one speed to another, under the constant-speed set."""
+    at_s = 1.0
+    motions = [
+        Motion(0.1, 1000.0, _STEP_FROM_DEG_S, config.limits.acceleration_deg_s2),
+        Motion(at_s, 1000.0, _STEP_TO_DEG_S, _SUDDEN_DEG_S2),
+    ]
+    time_s, speed_deg_s = _mean_speed(config, motions, at_s + 0.3, [], seed)
+    height = _STEP_TO_DEG_S - _STEP_FROM_DEG_S
+    model = _after_step(config, time_s, at_s, height, 0.0)
+    seen = speed_deg_s - _STEP_FROM_DEG_S
+    after = time_s > at_s
+    overshoot = [float(100.0 * (curve[after].max() / height - 1.0)) for curve in (seen, model)]
+    settling = [_settling_ms(time_s[after] - at_s, curve[after] - height, height) for curve in (seen, model)]
+    window = time_s > at_s - 0.02
+    return Check(
+        "step of the reference",
+        "speed of the table, deg/s",
+        Curve(time_s[window] - at_s, seen[window], model[window]),
+        (Figure("overshoot", "%", *overshoot), Figure("settling to 10 % after a step", "ms", *settling)),
+    )
+
+
+def load_step(config: TableConfig, seed: int) -> Check:
+    """Load the table while it turns at a constant speed."""
+    at_s = 1.0
+    motions = [Motion(0.1, 1000.0, _STEP_FROM_DEG_S, config.limits.acceleration_deg_s2)]
+    time_s, speed_deg_s = _mean_speed(config, motions, at_s + 0.3, [Load(at_s, LOAD_STEP_Nm)], seed)
+    model = _after_step(config, time_s, at_s, 0.0, LOAD_STEP_Nm)
+    seen = speed_deg_s - _STEP_FROM_DEG_S
+    after = time_s > at_s
+    peaks = [float(-curve[after].min()) for curve in (seen, model)]
+    settling = [_settling_ms(time_s[after] - at_s, curve[after], peaks[1]) for curve in (seen, model)]
+    window = time_s > at_s - 0.02
+    return Check(
+        f"load step of {LOAD_STEP_Nm:g} Nm",
+        "speed lost by the table, deg/s",
+        Curve(time_s[window] - at_s, seen[window], model[window]),
+        (Figure("peak after the load step", "deg/s", *peaks), Figure("settling to 10 % of it", "ms", *settling)),
+    )
+
+
+def small_moves(config: TableConfig, seed: int) -> Check:
+    """Make small moves from rest, there and back."""
+    speed, acceleration = config.power_on.speed_deg_s, config.power_on.acceleration_deg_s2
+    pause_s = config.protection.settling_time_s
+    targets = [sign * angle for angle in _SMALL_MOVES_DEG for sign in (1.0, -1.0)]
+    motions = [Motion(0.1 + index * pause_s, angle, speed, acceleration) for index, angle in enumerate(targets)]
+    answer = emulate(config, motions, 0.1 + len(targets) * pause_s, seed=seed)
+    ends = np.round((0.1 + np.arange(1, len(targets) + 1) * pause_s) * config.control.tick_hz).astype(int) - 2
+    misses = np.abs(answer.encoder_deg[ends] - targets)
+    arrival_s = _arrival_s(answer, [motion.time_s for motion in motions], pause_s)
+    return Check(
+        "small moves",
+        "encoder, deg",
+        Curve(answer.time_s, answer.encoder_deg, None),
+        (
+            Figure("greatest distance from the target at rest", "deg", float(misses.max()), None),
+            Figure("longest move of up to 3 deg", "s", arrival_s, None),
+        ),
+    )
+
+
+def reversal(config: TableConfig, seed: int) -> Check:
+    """Turn back at speed, through the backlash."""
+    acceleration, speed = config.limits.acceleration_deg_s2, config.limits.speed_deg_s / 2.0
+    motions = [Motion(0.1, 1000.0, speed, acceleration), Motion(0.8, -1000.0, speed, acceleration)]
+    answer = emulate(config, motions, 1.8, seed=seed)
+    error = answer.reference_deg - answer.encoder_deg
+    window = answer.time_s > 0.7
+    return Check(
+        "reversal through the backlash",
+        "encoder behind the reference, deg",
+        Curve(answer.time_s[window], error[window], None),
+        (Figure("most that the encoder is behind in a reversal", "deg", float(np.abs(error[window]).max()), None),),
+    )
+
+
+def creep(config: TableConfig, seed: int) -> Check:
+    """Creep, where stiction and the quantum of the speed weigh most."""
+    answer = emulate(config, [Motion(0.1, 1000.0, _CREEP_DEG_S, 1.0)], 4.0, seed=seed)
+    late = answer.time_s > 2.0
+    ripple = float(answer.true_speed_deg_s[late].std())
+    return Check(
+        f"creeping at {_CREEP_DEG_S:g} deg/s",
+        "speed of the table, deg/s",
+        Curve(answer.time_s, answer.true_speed_deg_s, None),
+        (Figure("ripple of the speed at creep", "deg/s", ripple, None),),
+    )
+
+
+def _mean_speed(
+    config: TableConfig, motions: list[Motion], duration_s: float, loads: list[Load], seed: int
+) -> tuple[Array, Array]:
+    """Return times, and the table's speed as the mean of runs from several starts."""
+    answers = [emulate(config, motions, duration_s, loads, seed + start) for start in range(_STARTS)]
+    return answers[0].time_s, np.mean([answer.true_speed_deg_s for answer in answers], axis=0)
+
+
+def _after_step(config: TableConfig, time_s: Array, at_s: float, reference_deg_s: float, load_Nm: float) -> Array:
+    """Return the linear answer of the speed to a step in the constant-speed set."""
+    after = (time_s > at_s).astype(float)
+    loop = closed_loop(config, Teeth.DRIVING, fixed_gains(config, config.gains.hold))
+    # A load that acts in a tick is an input at its start, a sample before its end.
+    load = np.append((load_Nm * after)[1:], load_Nm)
+    result: Array = _linear(loop, time_s, reference_deg_s * after, load)[0]
+    return result
+
+
+def _linear(loop: control.StateSpace, time_s: Array, reference_deg_s: Array, load_Nm: Array) -> Array:
+    """Return speed, measured speed and duty of the closed loop."""
+    response = control.forced_response(loop, time_s, np.vstack([reference_deg_s, load_Nm]))
+    outputs: Array = response.outputs
+    return outputs
+
+
+def _means(seen: Array, foretold: Array, where: Array) -> tuple[float, float]:
+    chosen = where.astype(bool)
+    return float(seen[chosen].mean()), float(foretold[chosen].mean())
+
+
+def _settling_ms(time_s: Array, deviation: Array, height: float) -> float:
+    """Return when the deviation last leaves a band of a tenth of the height."""
+    outside = np.flatnonzero(np.abs(deviation) > _SETTLED_SHARE * height)
+    return float(1e3 * time_s[outside[-1]]) if len(outside) else 0.0
+
+
+def _arrival_s(answer: Answer, starts_s: list[float], pause_s: float) -> float:
+    """Return the longest time from a command until the drive is off again."""
+    longest = 0.0
+    for start_s in starts_s:
+        during = (answer.time_s > start_s) & (answer.time_s < start_s + pause_s)
+        busy = answer.time_s[during & (answer.motion != IDLE)]
+        longest = max(longest, float(busy[-1] - start_s) if len(busy) else 0.0)
+    return longest

@@ -1,0 +1,58 @@
+"""Monte Carlo over the spread of the plant: how many of the tables that might be built meet the bounds."""
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from emulator.config import TableConfig
+from emulator.pid import Gains
+from tools.tuning.bounds import Bound
+from tools.tuning.frequency_response import Array
+from tools.tuning.loop_figures import LoopFigures, Loops, loop_figures
+
+GRID_SIZE = 256
+"""Coarser than that of the design; its answers in time are 0.256 s long, more than any loop within the bounds needs."""
+
+SPREAD_KEYS = (
+    ("motor", "resistance_ohm"),
+    ("motor", "inductance_H"),
+    ("motor", "torque_constant_Nm_A"),
+    ("motor", "rotor_inertia_kg_m2"),
+    ("gears", "inertia_kg_m2"),
+    ("gears", "efficiency"),
+    ("table", "inertia_kg_m2"),
+    ("friction", "viscous_Nm_s"),
+)
+
+
+class Outcome(NamedTuple):
+    """The plants' figures under one gain set, and the shares of them that meet each bound and all."""
+
+    figures: LoopFigures
+    shares: tuple[tuple[Bound, float], ...]
+    all_share: float
+    stable_share: float
+
+
+def spread_tables(config: TableConfig, count: int, spread: float, seed: int) -> list[TableConfig]:
+    """Return tables whose constants each lie uniformly within 1 - spread to 1 + spread of the configured value."""
+    factors = np.random.default_rng(seed).uniform(1.0 - spread, 1.0 + spread, (count, len(SPREAD_KEYS)))
+    return [_scaled(config, row) for row in factors]
+
+
+def monte_carlo(loops: Loops, gains: Gains, bounds: tuple[Bound, ...]) -> Outcome:
+    """Return how the plants of `loops` do under one gain set."""
+    figures = loop_figures(loops, np.array([gains]))
+    kept = np.array([figures.stable & (bound.excess(figures) <= 0.0) for bound in bounds])
+    shares = tuple((bound, float(row.mean())) for bound, row in zip(bounds, kept, strict=True))
+    return Outcome(figures, shares, float(kept.all(axis=0).mean()), float(figures.stable.mean()))
+
+
+def _scaled(config: TableConfig, factors: Array) -> TableConfig:
+    changes: dict[str, dict[str, Any]] = {}
+    for (section, key), factor in zip(SPREAD_KEYS, factors, strict=True):
+        value = getattr(getattr(config, section), key) * float(factor)
+        changes.setdefault(section, {})[key] = min(value, 1.0) if key == "efficiency" else value
+    sections: dict[str, Any] = {name: replace(getattr(config, name), **values) for name, values in changes.items()}
+    return replace(config, **sections)
