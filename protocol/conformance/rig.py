@@ -166,7 +166,11 @@ class Rig:
     def stand_at_home(self) -> None:
         """Take it that the table rests at home; what was seen of its motion before is forgotten."""
         self.motion = MotionRecord()
-        self._expect_motion(Motion(self.home_deg, 0.0, self.home_deg, ()), self.wire.clock.now_s(), 0.0)
+        self.stand_at(self.home_deg)
+
+    def stand_at(self, angle_deg: float) -> None:
+        """Take it that the reference rests at an angle."""
+        self._expect_motion(Motion(angle_deg, 0.0, angle_deg, ()), self.wire.clock.now_s(), 0.0)
 
     def move_to(self, angle_deg: float) -> None:
         """Command P, relative to home."""
@@ -220,7 +224,7 @@ class Rig:
 
     def check_tracking(self, name: str) -> None:
         """Measure the greatest difference between what was seen and the trapezoid, beyond what the times leave open."""
-        worst = max((self._excess(sample) for sample in self.motion.samples), default=0.0)
+        worst = max((self.excess(sample) for sample in self.motion.samples), default=0.0)
         self.measure(f"{name}: from the trapezoid", worst, "deg", most=self.profile.tolerance.tracking_deg)
 
     def check_rest(self, name: str) -> None:
@@ -264,7 +268,7 @@ class Rig:
     def _expect_motion(self, motion: Motion, began_s: float, uncertainty_s: float) -> None:
         self.motion.expectations.append(Expectation(began_s, uncertainty_s, motion))
 
-    def _excess(self, sample: Sample) -> float:
+    def excess(self, sample: Sample) -> float:
         """Return how far a sample is from where the reference can have been, with all times as they may have been."""
         running = [one for one in self.motion.expectations if one.began_s <= sample.time_s]
         window_s = sample.uncertainty_s + sum(one.uncertainty_s for one in running[-1:])

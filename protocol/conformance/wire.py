@@ -28,32 +28,33 @@ class RecordedPort:
     """A port that keeps what passes through it.
 
     Attributes:
+        inner: the port itself.
         clock: that of the port, simulated or real.
         events: what passed, in order.
     """
 
     def __init__(self, port: ReopenablePort) -> None:
+        self.inner = port
         self.clock: Clock = clock_of(port)
         self.events: list[Event] = []
-        self._port = port
 
     @property
     def timeout(self) -> float | None:
         """How long `read` waits, in seconds."""
-        return self._port.timeout
+        return self.inner.timeout
 
     @timeout.setter
     def timeout(self, timeout_s: float | None) -> None:
-        self._port.timeout = timeout_s
+        self.inner.timeout = timeout_s
 
     @property
     def in_waiting(self) -> int:
         """The number of bytes that can be read at once."""
-        return self._port.in_waiting
+        return self.inner.in_waiting
 
     def read(self, size: int, /) -> bytes:
         """Return `size` bytes, or fewer when `timeout` has passed."""
-        data = self._port.read(size)
+        data = self.inner.read(size)
         if data:
             last = self.events[-1] if self.events else None
             if last is not None and last.direction == "received" and not last.data.endswith(CR):
@@ -65,7 +66,7 @@ class RecordedPort:
     def write(self, data: bytes, /) -> int | None:
         """Send all of `data`."""
         self.events.append(Event(self.clock.now_s(), "sent", data))
-        return self._port.write(data)
+        return self.inner.write(data)
 
     def note(self, deed: str) -> None:
         """Record what is done to the table beside the wire."""
@@ -73,11 +74,11 @@ class RecordedPort:
 
     def open(self) -> None:
         """Take the port again."""
-        self._port.open()
+        self.inner.open()
 
     def close(self) -> None:
         """Give the port back."""
-        self._port.close()
+        self.inner.close()
 
 
 class Line(NamedTuple):

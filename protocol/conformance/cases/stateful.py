@@ -5,7 +5,7 @@ from protocol.conformance.rig import Rig
 from protocol.conformance.stand import RANDOM_SEARCH
 
 
-@case("4.1/11:random", RANDOM_SEARCH, travel_deg=20)
+@case("4.1/11:random", RANDOM_SEARCH, travel_deg=60)
 def any_sequence_of_commands_is_answered(rig: Rig) -> None:
     """Draw sequences of commands, waits, triggers and readings; a model of the registers predicts each answer."""
     from protocol.conformance.random_walk import walk  # noqa: PLC0415 - it needs hypothesis, which others do without

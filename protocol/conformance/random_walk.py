@@ -1,0 +1,222 @@
+"""Random walks through the protocol, beside a model of the registers: what no list of cases would think of.
+
+On a simulated table a failing walk is shrunk where it was found. A real table is not made to repeat it: the walk is
+drawn again from its seed on the stand-in, and shrunk there.
+"""
+
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+from hypothesis import HealthCheck, Phase, Verbosity, seed, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, precondition, rule, run_state_machine_as_test
+
+from protocol.conformance.ports import is_simulated, open_port
+from protocol.conformance.rig import Rig, number, require
+from protocol.conformance.stand import TRIGGER, stand_beside
+from protocol.conformance.suite import SessionError
+from protocol.conformance.verdict import NonconformityError
+from protocol.conformance.wire import RecordedPort, Wire
+from protocol.messages import ErrorCode
+
+_ON_A_PORT, _SIMULATED = (4, 12), (12, 20)
+"""Walks, and steps of each: a table that is moved for it is moved little."""
+_STAND_IN_URL = "emulator://"
+
+_REFUSED = (
+    (b"?", ErrorCode.UNKNOWN_COMMAND),
+    (b"R 1,5", ErrorCode.BAD_NUMBER),
+    (b"S 0", ErrorCode.OUT_OF_RANGE),
+    (b"P 99999999999", ErrorCode.OUT_OF_RANGE),
+    (b"R 5".ljust(33), ErrorCode.LINE_TOO_LONG),
+    (b"R 5\x18", ErrorCode.BAD_BYTE),
+)
+
+
+class _FoundError(BaseException):
+    """Carries a failure past hypothesis, which would have a real table repeat it."""
+
+
+def walk(rig: Rig) -> None:
+    """Walk at random on the rig's table.
+
+    Raises:
+        NonconformityError: the table left the model; the message ends with the steps, the fewest that were found.
+    """
+    chance = rig.chance.randrange(2**32)
+    if is_simulated(rig.wire.port.inner):
+        _search(rig, chance, _SIMULATED, NonconformityError, Phase.shrink)
+        return
+    try:
+        _search(rig, chance, _ON_A_PORT, _FoundError)
+    except _FoundError as found:
+        raise NonconformityError(f"{found}; {_on_the_stand_in(rig, chance)}") from None
+
+
+def _on_the_stand_in(rig: Rig, chance: int) -> str:
+    """Return what the stand-in does on the same walks."""
+    try:
+        port = open_port(_STAND_IN_URL, rig.profile)
+    except SessionError:
+        return "there is no stand-in here on which to shrink it"
+    stand = stand_beside(port, None, rig.profile)
+    twin = Rig(Wire(RecordedPort(port)), rig.profile, stand, 0, Random(0))  # noqa: S311  # not used
+    try:
+        _search(twin, chance, _ON_A_PORT, NonconformityError, Phase.shrink)
+    except NonconformityError as error:
+        return f"on the stand-in too: {error}"
+    finally:
+        port.close()
+    return "the stand-in walks the same way without fault"
+
+
+def _search(
+    rig: Rig, chance: int, size: tuple[int, int], failure: Callable[[str], BaseException], *phases: Phase
+) -> None:
+    walks, steps = size
+    machine = type("RandomWalkOfOneRig", (RandomWalk,), {"rig": rig, "failure": staticmethod(failure)})
+    run_state_machine_as_test(
+        seed(chance)(machine),
+        settings=settings(
+            max_examples=walks,
+            stateful_step_count=steps,
+            phases=(Phase.generate, *phases),
+            database=None,
+            deadline=None,
+            print_blob=False,
+            verbosity=Verbosity.quiet,
+            suppress_health_check=list(HealthCheck),
+        ),
+    )
+
+
+def _step(action: Callable[..., None]) -> Callable[..., None]:
+    """Let a rule keep its name and numbers, and turn what it finds into the failure that the search wants."""
+
+    def run(self: "RandomWalk", **arguments: Any) -> None:  # noqa: ANN401  # whatever the rule draws
+        self.steps.append(" ".join([action.__name__, *map(str, arguments.values())]))
+        try:
+            action(self, **arguments)
+        except NonconformityError as error:
+            raise self.failure(f"{error}; after {', '.join(self.steps)}") from None
+
+    run.__name__ = action.__name__
+    return run
+
+
+def _tenths(least: float, most: float) -> st.SearchStrategy[float]:
+    return st.integers(round(10 * least), round(10 * most)).map(lambda tenths: tenths / 10)
+
+
+class RandomWalk(RuleBasedStateMachine):
+    """The six commands, waits, triggers and refused lines, in any order.
+
+    The model: S and A, the trapezoid that the reference follows, and the latch, which is unknown until it is read.
+    """
+
+    rig: Rig
+    failure: Callable[[str], BaseException]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.steps: list[str] = []
+        self.latch: tuple[float, float] | None = None
+        self.rig.go_home()
+        allowed = self.rig.profile.motion
+        self.rig.settings(min(20, allowed.speed_deg_s), min(40, allowed.acceleration_deg_s2))
+
+    @rule(value=_tenths(2, 20))
+    @_step
+    def set_speed(self, value: float) -> None:
+        self.rig.set_speed(min(value, self.rig.profile.motion.speed_deg_s))
+
+    @rule(value=_tenths(20, 80))
+    @_step
+    def set_acceleration(self, value: float) -> None:
+        self.rig.set_acceleration(min(value, self.rig.profile.motion.acceleration_deg_s2))
+
+    @rule(angle=_tenths(-10, 10))
+    @_step
+    def move_to(self, angle: float) -> None:
+        self.rig.move_to(angle)
+
+    @rule(way=_tenths(-3, 3))
+    @_step
+    def move_by(self, way: float) -> None:
+        self.rig.move_by(way)
+
+    @rule(seconds=_tenths(0, 0.5))
+    @_step
+    def wait(self, seconds: float) -> None:
+        self.rig.wire.clock.sleep_s(seconds)
+
+    @rule()
+    @_step
+    def read_position(self) -> None:
+        self._sample()
+
+    @rule()
+    @_step
+    def read_latch(self) -> None:
+        latched = float(self.rig.read(b"L"))
+        if self.latch is None:
+            self.latch = latched, latched
+        low, high = self.latch
+        require(low <= latched <= high, f"the latch is {latched}, not {low:g} to {high:g} deg")
+        self.latch = latched, latched
+
+    @precondition(lambda self: TRIGGER in self.rig.stand.capabilities)
+    @rule()
+    @_step
+    def trigger(self) -> None:
+        before = self._sample()
+        self.rig.stand.trigger()
+        after = self._sample()
+        open_deg = self.rig.profile.resolution_deg + self.rig.profile.tolerance.tracking_deg  # a turn between the two
+        self.latch = min(before, after) - open_deg, max(before, after) + open_deg
+
+    @rule(refused=st.sampled_from(_REFUSED))
+    @_step
+    def be_refused(self, refused: tuple[bytes, ErrorCode]) -> None:
+        self.rig.refused(*refused)
+
+    @rule(letters=st.lists(st.sampled_from((b"H", b"L")), min_size=2, max_size=6))
+    @_step
+    def read_several_at_once(self, letters: list[bytes]) -> None:
+        self.rig.wire.send(b"".join(letter + b"\r" for letter in letters))
+        for letter in letters:
+            self.rig.angle_in(self.rig.reply_to(letter), letter)
+
+    @rule(half=st.sampled_from((b"R 5", b"P", b"H", b"S 1")))
+    @_step
+    def cancel(self, half: bytes) -> None:
+        self.rig.wire.send(half)
+        self.rig.refused(b"\x18", ErrorCode.BAD_BYTE)
+
+    @rule()
+    @_step
+    def come_to_rest(self) -> None:
+        self.rig.follow()
+        resting = float(self.rig.wait_for_rest())
+        last = self.rig.motion.expectations[-1]
+        allowed = self.rig.profile.tolerance.rest_deg + self.rig.profile.resolution_deg / 2
+        allowed += abs(last.motion.start_speed_deg_s) * last.uncertainty_s
+        error = resting - last.motion.target_deg
+        require(abs(error) <= allowed, f"at rest {error:.3g} deg from the target, allowed {allowed:.3g}")
+        # Whatever the time of an increment left open is known now.
+        self.rig.expect(b"P " + number(last.motion.target_deg))
+        self.rig.wait_for_rest()
+        self.rig.stand_at(last.motion.target_deg)
+
+    def teardown(self) -> None:
+        """Leave the table at rest; a failure has been told already."""
+
+    def _sample(self) -> float:
+        sample = self.rig.sample()
+        excess = self.rig.excess(sample)
+        require(
+            excess <= self.rig.profile.tolerance.tracking_deg,
+            f"the table is {excess:.3g} deg from where its reference can be, at {sample.position_deg:g} deg",
+        )
+        return sample.position_deg
