@@ -16,12 +16,12 @@ from scipy.sparse.csgraph import dijkstra as shortest_paths
 from planner.arrays import FloatArray
 from planner.config_map import column_value
 from planner.cost import acceleration_cost, speed_cost, value_cost
-from planner.cost_to_go import IndexArray
 from planner.crossing import step_is_allowed
 from planner.kernel import kernel
 from planner.motion import next_angle, next_speed, roll_out
 from planner.plan import NoPlan, Obstacle, Outcome, make_plan, obvious_obstacle
 from planner.problem import Problem, Terms
+from planner.state_grid import IndexArray
 
 NAME = "dijkstra"
 

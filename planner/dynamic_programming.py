@@ -14,12 +14,13 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.config_map import column_value
 from planner.cost import acceleration_cost, speed_cost, value_cost
-from planner.cost_to_go import CostToGo, Grid, cost_from, cost_to_go, default_grid, exact_grid
+from planner.cost_to_go import CostToGo, cost_from, cost_to_go
 from planner.crossing import step_is_allowed
 from planner.kernel import kernel
 from planner.motion import next_angle, next_speed, roll_out
 from planner.plan import NoPlan, Obstacle, Outcome, Plan, make_plan, obvious_obstacle
 from planner.problem import Problem, Terms
+from planner.state_grid import Grid, default_grid, exact_grid
 
 NAME = "dynamic_programming"
 

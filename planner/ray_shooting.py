@@ -8,7 +8,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.config_map import column_value
 from planner.cost import acceleration_cost, speed_cost, value_cost
-from planner.cost_to_go import CostToGo, Grid, cost_from_any_speed, cost_to_go, default_grid
+from planner.cost_to_go import CostToGo, cost_from_any_speed, cost_to_go
 from planner.crossing import step_is_allowed
 from planner.errors import PlannerError
 from planner.kernel import kernel
@@ -16,6 +16,7 @@ from planner.motion import limited_acceleration, next_angle, next_speed
 from planner.plan import Outcome, Pause, greedy_start, make_plan, obvious_obstacle
 from planner.problem import Problem, Terms
 from planner.rotate_when_blocked import nearest_allowed_angle
+from planner.state_grid import Grid, default_grid
 
 NAME = "ray_shooting"
 GUIDED_NAME = "guided_ray_shooting"

@@ -7,8 +7,9 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.config_map import BoolArray
-from planner.cost_to_go import ANY_COST, cost_to_go, default_grid
+from planner.cost_to_go import ANY_COST, cost_to_go
 from planner.problem import Problem
+from planner.state_grid import default_grid
 
 
 class Reachability(NamedTuple):

@@ -3,7 +3,7 @@
 import ctypes
 import gc
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -11,17 +11,23 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
+from planner.commands.plan import problem_of
+from planner.configuration import Configuration
 from planner.cost import Weights, default_weights
-from planner.cost_to_go import Grid, cost_to_go, exact_grid, lay_out_columns
+from planner.cost_to_go import cost_to_go, lay_out_columns
 from planner.dijkstra import Cells, lattice_path
 from planner.dynamic_programming import dynamic_programming, follow
+from planner.map_builder import build_maps
+from planner.map_problem import map_problem
 from planner.motion import Limits
 from planner.plan import Outcome, Plan
 from planner.planners import PLANNERS, Planner
 from planner.problem import Problem
 from planner.ray_shooting import Rays, ray_shooting
-from planner.receding import online_step, prepare_online_step, receding
+from planner.receding import FAST_SPEED_COUNT, SPEED_COUNT, online_step, prepare_online_step, receding
+from planner.scan import load_scan, shipped_scans
 from planner.smoothing import smooth
+from planner.state_grid import Grid, exact_grid
 from planner.synthetic_maps import MapFamily, synthetic_map
 from planner.verification import verify
 
@@ -59,6 +65,7 @@ def smoothed_ray_shooting(problem: Problem) -> Outcome:
 
 COMPARED: Mapping[str, Planner] = {
     **{name: PLANNERS[name] for name in ("dynamic_programming", "receding", "guided_ray_shooting", "ray_shooting")},
+    "receding, fast grid": partial(receding, speed_count=FAST_SPEED_COUNT),
     "ray_shooting+smoothing": smoothed_ray_shooting,
 }
 
@@ -77,6 +84,7 @@ def bench_planner(stream: TextIO) -> None:
     _bench_graph(stream)
     _bench_steps(stream)
     _bench_families(stream)
+    _bench_scans(stream)
     _bench_growth(stream)
 
 
@@ -125,23 +133,44 @@ def _bench_graph(stream: TextIO) -> None:
 
 def _bench_steps(stream: TextIO) -> None:
     problem = Problem(synthetic_map(MapFamily(0.1, 6.0), seed=2), step_s=0.25)
-    online = prepare_online_step(problem)
-    columns = lay_out_columns(problem.terms, online.grid, online.unit)
-    step = partial(online_step, problem.terms, online, *columns, 0, 50, 0.0, 0.0)
     rays = median_seconds(partial(ray_shooting, problem, Rays(21, 30)), 50) / problem.step_count
     print("\nOne step", file=stream)
-    print(f"  ray shooting, 21 rays x 30 columns   {rays * 1e6:8.1f} us (a whole plan / its steps)", file=stream)
-    print(f"  receding, 50 columns in view         {median_seconds(step, 200) * 1e6:8.1f} us", file=stream)
+    print(f"  ray shooting, 21 rays x 30 columns     {rays * 1e6:8.1f} us (a whole plan / its steps)", file=stream)
+    for name, speed_count in (("fast grid", FAST_SPEED_COUNT), ("default", SPEED_COUNT)):
+        online = prepare_online_step(problem, speed_count)
+        columns = lay_out_columns(problem.terms, online.grid, online.unit)
+        step = partial(online_step, problem.terms, online, *columns, 0, 50, 0.0, 0.0)
+        seconds = median_seconds(step, 200)
+        print(f"  receding, 50 columns in view, {name:9} {seconds * 1e6:8.1f} us", file=stream)
 
 
 def _bench_families(stream: TextIO) -> None:
     for family in FAMILIES:
-        tallies = {name: Tally([], [], [], []) for name in COMPARED}
-        crossable = sum(_tally(family, seed, tallies) for seed in range(MAPS_PER_FAMILY))
-        print(f"\n{family.name}: {crossable} of {MAPS_PER_FAMILY} maps have a way on the exact lattice", file=stream)
-        print("  planner                   ratio: mean    p95    max  touched  pauses  ms/plan us/step", file=stream)
-        for name, tally in tallies.items():
-            print(f"  {name:24}  {_row(tally)}", file=stream)
+        problems = [family_problem(family, seed) for seed in range(MAPS_PER_FAMILY)]
+        _print_comparison(family.name, problems, stream)
+
+
+def _bench_scans(stream: TextIO) -> None:
+    for name in shipped_scans():
+        scan = load_scan(name)
+        maps = build_maps(map_problem(scan), [Configuration.LEFTY_ABOVE_NOFLIP], 100)
+        _print_comparison(f"shipped scan {name}", [problem_of(scan, each, None) for each in maps.values()], stream)
+
+
+def family_problem(family: Family, seed: int) -> Problem:
+    """Return one problem of a family."""
+    limits = Limits()
+    weights = Weights(*(weight * family.weight_factor for weight in default_weights(limits)))
+    return Problem(synthetic_map(family.maps, seed), family.step_s, limits, weights)
+
+
+def _print_comparison(name: str, problems: Sequence[Problem], stream: TextIO) -> None:
+    tallies = {planner: Tally([], [], [], []) for planner in COMPARED}
+    crossable = sum(_tally(problem, tallies) for problem in problems)
+    print(f"\n{name}: {crossable} of {len(problems)} maps have a way on the exact lattice", file=stream)
+    print("  planner                   ratio: mean    p95    max  touched  pauses  ms/plan", file=stream)
+    for planner, tally in tallies.items():
+        print(f"  {planner:24}  {_row(tally)}", file=stream)
 
 
 def _row(tally: Tally) -> str:
@@ -150,15 +179,12 @@ def _row(tally: Tally) -> str:
     return (
         f"{ratios.mean():11.4f} {np.percentile(ratios, 95):6.3f} {ratios.max():6.3f} "
         f"{100.0 * float(np.mean(tally.touched or [False])):6.0f} % {sum(tally.pauses):7d} "
-        f"{milliseconds:8.2f} {milliseconds * 10.0:7.1f}"
+        f"{milliseconds:8.2f}"
     )
 
 
-def _tally(family: Family, seed: int, tallies: dict[str, Tally]) -> bool:
-    """Plan one map of a family by all planners from the optimum's start; tell whether the lattice has a way."""
-    limits = Limits()
-    weights = Weights(*(weight * family.weight_factor for weight in default_weights(limits)))
-    problem = Problem(synthetic_map(family.maps, seed), family.step_s, limits, weights)
+def _tally(problem: Problem, tallies: dict[str, Tally]) -> bool:
+    """Plan one map by all planners from the optimum's start; tell whether the lattice has a way."""
     optimum = lattice_optimum(problem)
     if optimum is None:
         return False

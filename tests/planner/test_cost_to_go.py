@@ -5,10 +5,11 @@ import pytest
 
 from planner.config_map import ConfigurationMap
 from planner.cost import Weights
-from planner.cost_to_go import ANY_COST, cost_from, cost_to_go, default_grid, exact_grid, ladder
+from planner.cost_to_go import ANY_COST, cost_from, cost_to_go
 from planner.dijkstra import Cells, lattice_path
 from planner.motion import Limits
 from planner.problem import Problem
+from planner.state_grid import GridError, default_grid, exact_grid
 from planner.synthetic_maps import MapFamily, synthetic_map
 from tests.planner.exhaustive_search import least_cost
 
@@ -84,24 +85,8 @@ def test_a_cost_to_go_takes_four_bytes_a_state() -> None:
     assert to_go.costs.nbytes == 4 * 10 * speeds * 200
 
 
-@pytest.mark.parametrize(("reach", "count"), [(1, 3), (4, 15), (10, 21), (50, 21), (200, 41)])
-def test_a_ladder_of_jumps_is_symmetric_and_reaches_the_limit(reach: int, count: int) -> None:
-    jumps = ladder(reach, count)
-    assert jumps.tolist() == (-jumps[::-1]).tolist()
-    assert 0 in jumps
-    assert jumps.max() == reach
-    assert len(jumps) <= count
-    assert len(set(jumps.tolist())) == len(jumps)
-
-
-@pytest.mark.parametrize("step_s", [0.01, 0.1, 1.0, 10.0])
-@pytest.mark.parametrize("limits", [Limits(), Limits(1.0, 1000.0), Limits(100.0, 0.5)])
-def test_a_default_grid_keeps_the_limits_and_uses_them(step_s: float, limits: Limits) -> None:
-    problem = Problem(synthetic_map(MapFamily(location_count=30, angle_count=20), 0), step_s=step_s, limits=limits)
-    grid = default_grid(problem)
-    fastest = grid.speeds_deg_s[-1]
-    assert fastest <= limits.speed_deg_s + 1e-9
-    assert fastest >= 0.8 * min(limits.speed_deg_s, 29 * limits.acceleration_deg_s2 * step_s)
-    strongest = grid.jumps[-1] * grid.speed_step_deg_s / step_s
-    assert strongest <= limits.acceleration_deg_s2 * (1 + 1e-9)
-    assert strongest >= 0.8 * min(limits.acceleration_deg_s2, 2.0 * fastest / step_s)
+def test_a_grid_that_would_fill_the_memory_is_refused_with_its_size() -> None:
+    # The table gains 5e-6 deg/s a step, and may start at any speed up to 40 deg/s.
+    problem = replace(lattice_problem(0), step_s=1e-6, limits=Limits(40.0, 5.0), start_speed_deg_s=None)
+    with pytest.raises(GridError, match="allowed are 200,000,000"):
+        cost_to_go(problem, default_grid(problem))

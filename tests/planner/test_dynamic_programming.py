@@ -7,11 +7,12 @@ from hypothesis import strategies as st
 
 from planner.config_map import ConfigurationMap
 from planner.cost import Weights
-from planner.cost_to_go import cost_to_go, default_grid, exact_grid
+from planner.cost_to_go import cost_to_go
 from planner.dynamic_programming import dynamic_programming, follow
 from planner.motion import Limits, motion_through_angles
 from planner.plan import NoPlan, Obstacle, Plan, path_cost
 from planner.problem import Problem
+from planner.state_grid import default_grid, exact_grid
 from planner.synthetic_maps import MapFamily, synthetic_map
 from tests.planner.exhaustive_search import is_forbidden_on_the_way, least_cost, motion
 
