@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 from planner.commands import map as map_command
 from planner.commands import plan as plan_command
+from planner.commands import run as run_command
+from planner.commands import show as show_command
 from planner.errors import PlannerError
 
 _BAD_INPUT = 2
@@ -22,6 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     map_command.add_parser(commands)
     plan_command.add_parser(commands)
+    run_command.add_parser(commands)
+    show_command.add_parser(commands)
     chosen = parser.parse_args(arguments)
     try:
         return int(chosen.run(chosen))

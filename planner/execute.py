@@ -1,4 +1,4 @@
-"""Run a motion on the table that a port leads to: send each command in time, read, correct, and stop when it goes wrong.
+"""Run a motion on the table at a port: send each command in time, read, correct, and stop when it goes wrong.
 
 One code path for a pty, TCP, a serial device and simulated time: the clock comes from the port. Between two motion
 commands the position is polled (H) and, at each scan location, the latch is read (L); neither delays a command. The
@@ -10,12 +10,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from planner.inside_view import InsideView, Look
+from planner.inside_view import InsideView
 from planner.motion import Limits
 from planner.stream import LATEST_S, TimedCommand, Wire, check_it_fits, command_line, exchanges_s, stream
 from planner.table_motion import Phase, TableMotion
 from planner.velocity_profile import MotionCommand, ReferenceState, advance, time_to_rest_s
-from protocol import CommandRefused, TableClient, TableError, Verb
+from protocol import ArrivalTimeout, CommandRefused, TableClient, TableError, Verb
 
 # What the bytes of H and of its answer come to.
 _READING_BYTES = 12
@@ -24,15 +24,19 @@ _SLACK_S = 0.005
 
 
 class ExecutionError(TableError):
-    """The table did not do what the plan asks."""
+    """The table cannot do what the plan asks."""
+
+
+class StrayedError(ExecutionError):
+    """The table is not where the plan wants it."""
 
 
 class Settings(NamedTuple):
     """How a motion is run.
 
     Attributes:
-        lag_s: how long after the reference the encoder is at the same angle; the default is that of the stand-in's speed
-            loop.
+        lag_s: how long after the reference the encoder is at the same angle; the default is that of the stand-in's
+            speed loop.
         lead_s: how long before their time the commands take effect. With the lag, the encoder is in time; with 0, the
             reference is.
         tolerance_deg: how far the encoder may be from the plan before the table is stopped.
@@ -82,7 +86,7 @@ class Observation(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """From `time_s` on the stream was computed anew, for a reference that was `drift_deg` ahead of what was expected."""
+    """From `time_s` on the stream was computed anew: the table was `drift_deg` ahead of where it was expected."""
 
     time_s: float
     drift_deg: float
@@ -97,12 +101,14 @@ class Record:
         observations: where the table was seen.
         corrections: where the stream was changed for drift.
         failure: why the motion was stopped; None when it came to its end.
+        has_strayed: whether it was stopped because the table was not where it should be.
     """
 
     sent: list[Sent] = field(default_factory=list)
     observations: list[Observation] = field(default_factory=list)
     corrections: list[Correction] = field(default_factory=list)
     failure: str | None = None
+    has_strayed: bool = False
 
 
 def execute(
@@ -112,7 +118,7 @@ def execute(
     wire: Wire,
     settings: Settings | None = None,
     view: InsideView | None = None,
-    progress: Callable[[float, float], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Record:
     """Run a motion on a table that stands at its start, and return what happened.
 
@@ -125,7 +131,7 @@ def execute(
         wire: what its commands have to pass.
         settings: how it is run.
         view: a way to look into the table, where there is one; then it also gets its triggers from here.
-        progress: called with the time of the motion and its end.
+        progress: called with the time of the motion and its end, in ms.
 
     Raises:
         StreamError: the commands follow one another faster than the wire carries them; nothing was sent.
@@ -137,6 +143,7 @@ def execute(
         run.go(commands)
     except TableError as error:
         run.record.failure = str(error)
+        run.record.has_strayed = isinstance(error, StrayedError | ArrivalTimeout)
     except KeyboardInterrupt:
         run.record.failure = "interrupted"
     if run.record.failure is not None:
@@ -188,7 +195,7 @@ class _Run:
         wire: Wire,
         settings: Settings,
         view: InsideView | None,
-        progress: Callable[[float, float], None] | None,
+        progress: Callable[[int, int], None] | None,
     ) -> None:
         self.record = Record()
         self._table, self._motion, self._limits, self._wire = table, motion, limits, wire
@@ -237,8 +244,8 @@ class _Run:
         late_s = self._now_s() - due_s
         if late_s > LATEST_S:
             raise ExecutionError(
-                f"the command of location {timed.leg.column} would have come {late_s:.2f} s late, more than {LATEST_S:g} s:"
-                " the table or this machine answers too slowly"
+                f"the command of location {timed.leg.column} would have come {late_s:.2f} s late, more than"
+                f" {LATEST_S:g} s: the table or this machine answers too slowly"
             )
         self._table.move_to(command.target_deg)
         self._running = timed
@@ -272,21 +279,10 @@ class _Run:
         """Pull the trigger where it is ours to pull, and read the latch."""
         column, _ = self._pending_columns.pop(0)
         time_s = self._now_s()
-        look = None
         if self._view is not None:
-            look = self._view.look()
+            self._look(column)
             self._view.trigger()
-        latched_deg = self._table.latched_deg()
-        self._see(
-            Observation(
-                time_s,
-                "L",
-                latched_deg,
-                column,
-                look.reference_deg if look else None,
-                look.true_deg if look else None,
-            )
-        )
+        self._see(Observation(time_s, "L", self._table.latched_deg(), column))
 
     def _poll(self) -> None:
         """Read the position, and stop the run where it is not that of the plan."""
@@ -296,11 +292,11 @@ class _Run:
         self._see(Observation(time_s, "H", position_deg))
         planned_deg = self._motion.state_at(time_s).angle_deg
         if abs(position_deg - planned_deg) > self._settings.tolerance_deg:
-            raise ExecutionError(
-                f"at {time_s:.2f} s the table is at {position_deg:.1f} deg and should be at {planned_deg:.1f}: more than"
-                f" {self._settings.tolerance_deg:g} deg off, it was stopped; does it turn freely?"
+            raise StrayedError(
+                f"at {time_s:.2f} s the table is at {position_deg:.1f} deg and should be at {planned_deg:.1f}, more"
+                f" than {self._settings.tolerance_deg:g} deg off; does it turn freely?"
             )
-        # Where the reference was when the table's lag began; what it did before the command that runs is of no interest.
+        # Where the reference was a lag ago: there the encoder is now.
         assert self._running is not None
         since_s = time_s + self._settings.lead_s - self._settings.lag_s - self._running.time_s
         if since_s >= 0.0:
@@ -310,13 +306,13 @@ class _Run:
     def _see(self, observation: Observation) -> None:
         self.record.observations.append(observation)
         if self._progress is not None:
-            self._progress(observation.time_s, self._motion.end_s)
+            self._progress(round(1000.0 * observation.time_s), round(1000.0 * self._motion.end_s))
 
-    def _look(self) -> None:
+    def _look(self, column: int | None = None) -> None:
         assert self._view is not None
-        look: Look = self._view.look()
+        look = self._view.look()
         self.record.observations.append(
-            Observation(self._now_s(), "inside", look.encoder_deg, None, look.reference_deg, look.true_deg)
+            Observation(self._now_s(), "inside", look.encoder_deg, column, look.reference_deg, look.true_deg)
         )
         self._next_look_s = self._now_s() + self._settings.look_s
 

@@ -91,7 +91,9 @@ class ControlView:
         return answer
 
     def _silent(self, error: Exception) -> PlannerError:
-        return PlannerError(f"{self._path}: no stand-in answers on its control channel ({error}); start it with --control")
+        return PlannerError(
+            f"{self._path}: no stand-in answers on its control channel ({error}); start it with --control"
+        )
 
 
 def view_of(port: object) -> InsideView | None:

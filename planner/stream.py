@@ -5,8 +5,8 @@ the reference is *predicted* to be, exactly, after all commands before it (`velo
 that bring it nearest to the plan at the step's end: what one step could not say, the next one takes out.
 
 In a step the reference goes from its present speed towards S at the rate A, and then holds S. P only gives the
-direction, but the controller brakes for it, so it lies beyond the way to stop. It does not lie farther than that: if the
-line dies, the table runs on to P and stands there.
+direction, but the controller brakes for it, so it lies beyond the way to stop. It does not lie farther than that: if
+the line dies, the table runs on to P and stands there.
 """
 
 import math
@@ -135,8 +135,9 @@ def check_it_fits(commands: Sequence[TimedCommand], wire: Wire) -> None:
         if needed_s > step_s:
             most_s = max(exchanges_s(wire, two.command, one.command) for one, two in pairwise(commands))
             raise StreamError(
-                f"the commands of location {following.leg.column} take {1000 * needed_s:.0f} ms at {wire.baud} baud, and the"
-                f" step before it lasts {1000 * step_s:.0f} ms; a time step of {math.ceil(100 * most_s) / 100:g} s would fit"
+                f"the commands of location {following.leg.column} take {1000 * needed_s:.0f} ms at {wire.baud} baud,"
+                f" and the step before lasts {1000 * step_s:.0f} ms; a time step of {math.ceil(100 * most_s) / 100:g} s"
+                " would fit"
             )
 
 
