@@ -38,7 +38,7 @@ class Load(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What the table did, an entry for each tick. Speeds and angles are the table's; true ones lie behind the backlash."""
+    """What the table did, an entry for each tick. True angles and speeds lie behind the backlash."""
 
     time_s: Array
     reference_deg: Array

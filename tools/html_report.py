@@ -4,13 +4,14 @@ import io
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
 BLUE, ORANGE, GREEN, RED, GREY = "#1f5fa8", "#d9822b", "#2e7d4f", "#b3362b", "#7a7f87"
 
-_SETTINGS = {
+_SETTINGS: Any = {
     "svg.hashsalt": "seventh-axis",  # the same figure gives the same bytes
     "svg.fonttype": "none",
     "font.family": "sans-serif",
@@ -30,7 +31,8 @@ _SETTINGS = {
 _STYLE = """
 body { font: 15px/1.5 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; color: #23272d; background: #fff;
        max-width: 1080px; margin: 2.2em auto; padding: 0 1.4em; }
-h1 { font-size: 1.7em; margin-bottom: .2em; } h2 { font-size: 1.2em; margin-top: 2em; border-bottom: 1px solid #d5d9de; }
+h1 { font-size: 1.7em; margin-bottom: .2em; }
+h2 { font-size: 1.2em; margin-top: 2em; border-bottom: 1px solid #d5d9de; }
 p { max-width: 52em; } .lead { font-size: 1.08em; }
 table { border-collapse: collapse; margin: .8em 0; font-variant-numeric: tabular-nums; }
 th, td { padding: .28em .9em .28em 0; text-align: right; border-bottom: 1px solid #e3e6ea; }

@@ -72,8 +72,9 @@ def _print(tuning: Tuning) -> None:
     for name, tuned in tuning.sets.items():
         gains = getattr(tuning.after.gains, name)
         print(
-            f"{tuned.title}: K {gains.proportional_duty_s_deg:.5f} duty s/deg, Ti {1e3 * gains.integral_time_s:.3f} ms, "
-            f"Td {1e3 * gains.derivative_time_s:.3f} ms; bounded by {', '.join(map(str, tuned.design.binding)) or 'nothing'}; "
+            f"{tuned.title}: K {gains.proportional_duty_s_deg:.5f} duty s/deg, "
+            f"Ti {1e3 * gains.integral_time_s:.3f} ms, Td {1e3 * gains.derivative_time_s:.3f} ms; "
+            f"bounded by {', '.join(map(str, tuned.design.binding)) or 'nothing'}; "
             f"{100 * tuned.spread.all_share:.0f} % of the spread plants meet all bounds"
         )
     for before, after in tuning.checks:

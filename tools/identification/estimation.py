@@ -1,8 +1,8 @@
 """Estimation of the constants: the most likely ones, given what was taken for granted beforehand.
 
-Newton's method on the posterior, with Levenberg's damping. The answer of a table with dry friction and backlash is rugged
-in its constants, so the way is long: first with a coarse scale, from several backlashes, then finer, and from each peak a
-few draws from its surroundings are tried for a better one.
+Newton's method on the posterior, with Levenberg's damping. The answer of a table with dry friction and backlash is
+rugged in its constants, so the way is long: first with a coarse scale, from several backlashes, then finer, and from
+each peak a few draws from its surroundings are tried for a better one.
 """
 
 from collections.abc import Callable
@@ -133,4 +133,4 @@ def _with_covariance(posterior: Posterior, peak: Estimate) -> Estimate:
     """Return the peak with the covariance about it; long differences see past the ruggedness."""
     jacobian = posterior.jacobian(peak.vector, 8.0)
     information = posterior.information(jacobian, peak.foretold_deg, peak.scale_deg)
-    return peak._replace(covariance=np.linalg.inv(information))
+    return peak._replace(covariance=np.linalg.inv(information).astype(np.float64))

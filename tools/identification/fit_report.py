@@ -51,8 +51,9 @@ def fit_report(found: Identified, assumed: TableConfig, source: str) -> str:
             heading("Constants, with 95 % confidence intervals"),
             table_block(("constant", "estimate", "interval", ""), rows),
             paragraph(
-                "The intervals hold for the model's structure and for what was assumed: motion alone cannot tell the "
-                f"motor's resistance, so torques and inertias hold for the assumed {assumed.motor.resistance_ohm:g} ohm.",
+                "The intervals hold for the model's structure and for what was assumed: motion alone cannot tell "
+                f"the motor's resistance, so torques and inertias hold for the assumed "
+                f"{assumed.motor.resistance_ohm:g} ohm.",
                 "quiet",
             ),
             heading("The fit"),

@@ -96,8 +96,10 @@ def identify(
         seed: Of the search.
         progress: Called with the share that is done.
     """
-    problem = _wire_problem if isinstance(recording, WireRecording) else _drive_problem
-    time_s, seen_deg, posterior = problem(config, recording)  # type: ignore[operator]  # each takes its own kind
+    if isinstance(recording, WireRecording):
+        time_s, seen_deg, posterior = _wire_problem(config, recording)
+    else:
+        time_s, seen_deg, posterior = _drive_problem(config, recording)
     starts = []
     for arcmin in _BACKLASH_STARTS_ARCMIN:
         start = posterior.prior.mean.copy()
@@ -132,7 +134,8 @@ def _wire_problem(config: TableConfig, recording: WireRecording) -> tuple[Array,
 
     def foretell(vector: Array) -> Array:
         *logarithms, delay_s, start_deg = vector
-        return start_deg + wire_positions_deg(with_logarithms(config, logarithms), recording, motions, delay_s)
+        turned = wire_positions_deg(with_logarithms(config, logarithms), recording, motions, delay_s)
+        return turned + float(start_deg)
 
     prior = _prior(config, [0.0, 0.0], [_WIRE_DELAY_S, _START_DEG])
     steps = np.array([*(parameter.step for parameter in PARAMETERS), 2e-4, 1e-3])
@@ -150,7 +153,8 @@ def _drive_problem(config: TableConfig, recording: DriveRecording) -> tuple[Arra
     def foretell(vector: Array) -> Array:
         *logarithms, delay_ticks = vector
         positions = drive_positions_deg(with_logarithms(config, logarithms), duty, max(delay_ticks, 0.0))
-        return np.diff(positions[::window])
+        made: Array = np.diff(positions[::window])
+        return made
 
     prior = _prior(config, [1.0], [1.0])
     steps = np.array([*(parameter.step for parameter in PARAMETERS), 0.1])

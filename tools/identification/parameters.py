@@ -1,6 +1,6 @@
 """The constants that a recording is asked for, as keys of the table's configuration."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from math import exp, log
 from typing import Any, NamedTuple
@@ -54,7 +54,7 @@ BACKLASH = 3
 """The backlash's place: the one constant from several values of which the search begins."""
 
 
-def with_logarithms(config: TableConfig, logarithms: Sequence[float]) -> TableConfig:
+def with_logarithms(config: TableConfig, logarithms: Iterable[float]) -> TableConfig:
     """Return the configuration with the values whose logarithms these are, in the order of `PARAMETERS`."""
     for parameter, logarithm in zip(PARAMETERS, logarithms, strict=True):
         config = parameter.set_log(config, logarithm)

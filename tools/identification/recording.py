@@ -6,8 +6,8 @@ Over the wire (`WireRecording`), a CSV file with the columns
     command       `P 30.0`, `R`, `S` and `A` likewise; `H` in the row of a reading
     position_deg  the answer to `H`, empty in the rows of the other commands
 
-From a drive (`DriveRecording`), or from the emulator's own trace, a CSV file that has among its columns `time_s`, `duty`
-(-1..1) and `position_deg` or `encoder_deg`.
+From a drive (`DriveRecording`), or from the emulator's own trace, a CSV file that has among its columns `time_s`,
+`duty` (-1..1) and `position_deg` or `encoder_deg`.
 """
 
 import csv

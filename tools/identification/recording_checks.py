@@ -49,7 +49,8 @@ def _check_gaps(time_s: Array) -> None:
     if steps.max() > LONGEST_GAP_S:
         at = int(np.argmax(steps))
         raise RecordingError(
-            f"the recording has a gap of {steps[at]:.2f} s at {time_s[at]:.2f} s; the longest allowed is {LONGEST_GAP_S:g} s"
+            f"the recording has a gap of {steps[at]:.2f} s at {time_s[at]:.2f} s; "
+            f"the longest allowed is {LONGEST_GAP_S:g} s"
         )
 
 
@@ -89,8 +90,9 @@ def _check_against_commands(config: TableConfig, recording: WireRecording) -> No
     if stray.max() > _STRAY_DEG:
         at = int(np.argmax(stray > _STRAY_DEG))
         raise RecordingError(
-            f"from {recording.time_s[at]:.2f} s on the table is not where its commands send it (travel {ratio:.3g} times "
-            "as far): wrong units, a step of the clock, lost commands, or other gears and encoder than configured"
+            f"from {recording.time_s[at]:.2f} s on the table is not where its commands send it "
+            f"(travel {ratio:.3g} times as far): wrong units, a step of the clock, lost commands, "
+            "or other gears and encoder than configured"
         )
 
 

@@ -66,15 +66,15 @@ def wire_positions_deg(
 
 
 def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) -> Array:
-    """Return where the motor turns the table to, after each tick, under a duty that comes late by some ticks.
+    """Return where the motor turns the table to, at the end of each tick.
 
     Args:
         config: The table.
-        duty: (n,) for each tick.
-        delay_ticks: From 0; a fraction of a tick mixes two neighbours.
+        duty: (n,) as computed at the end of each tick.
+        delay_ticks: From there to when it is on the bridge, from 0; a fraction of a tick mixes two neighbours.
     """
     whole = int(delay_ticks)
-    padded = np.concatenate([np.zeros(whole + 1), duty])[: len(duty) + 1]
+    padded = np.concatenate([np.zeros(whole + 2), duty])[: len(duty) + 1]
     share = delay_ticks - whole
     applied = (padded[1:] * (1.0 - share) + padded[:-1] * share) * config.driver.supply_V
     constants, state = switched_on(config, _SEED)

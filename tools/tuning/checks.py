@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import control
 import numpy as np
+from numpy.typing import NDArray
 
 from emulator.config import TableConfig
 from emulator.firmware import IDLE
@@ -196,9 +197,8 @@ def _linear(loop: control.StateSpace, time_s: Array, reference_deg_s: Array, loa
     return outputs
 
 
-def _means(seen: Array, foretold: Array, where: Array) -> tuple[float, float]:
-    chosen = where.astype(bool)
-    return float(seen[chosen].mean()), float(foretold[chosen].mean())
+def _means(seen: Array, foretold: Array, where: NDArray[np.bool_]) -> tuple[float, float]:
+    return float(seen[where].mean()), float(foretold[where].mean())
 
 
 def _settling_ms(time_s: Array, deviation: Array, height: float) -> float:

@@ -30,12 +30,14 @@ class PlantResponse(NamedTuple):
 
 def grid_z(size: int = GRID_SIZE) -> Complex:
     """Return e^(j omega T) of the grid without 0 Hz, where the integrator has no finite answer."""
-    return np.exp(2j * np.pi * np.arange(1, size // 2 + 1) / size)
+    result: Complex = np.exp(2j * np.pi * np.arange(1, size // 2 + 1) / size)
+    return result
 
 
 def grid_hz(config: TableConfig, size: int = GRID_SIZE) -> Array:
     """Return the frequencies of `grid_z`."""
-    return np.arange(1, size // 2 + 1) * (config.control.tick_hz / size)
+    result: Array = np.arange(1, size // 2 + 1, dtype=np.float64) * (config.control.tick_hz / size)
+    return result
 
 
 def plant_response(configs: list[TableConfig], teeth: Teeth, z: Complex) -> PlantResponse:

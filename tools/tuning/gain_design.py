@@ -55,7 +55,7 @@ def design(loops: Loops, bounds: tuple[Bound, ...], objective: str) -> Design:
     best = np.zeros(3)
     for zoom in range(_ZOOMS + 1):
         counts = _FINE if zoom else _COARSE
-        axes = [np.linspace(*ends, count) for *ends, count in zip(low, high, counts, strict=True)]
+        axes = [np.linspace(start, end, count) for start, end, count in zip(low, high, counts, strict=True)]
         points = np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=-1)
         figures = loop_figures(loops, _registers(loops, points))
         best = points[_best(figures, bounds, objective)]
@@ -73,7 +73,7 @@ def _best(figures: LoopFigures, bounds: tuple[Bound, ...], objective: str) -> in
 
 
 def _search_box(loops: Loops) -> tuple[Array, Array]:
-    """Return the corners of the search, in the logarithms of K times the plant's gain and of Ti, and in Td over the window.
+    """Return the corners of the search: the logarithms of K times the plant's gain and of Ti, and Td over the window.
 
     The delay of the loop, about half the window and two ticks, is the only time scale that limits the gains.
     """

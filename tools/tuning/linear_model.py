@@ -55,9 +55,9 @@ def motor_system(config: TableConfig, teeth: Teeth) -> tuple[Array, Array]:
 def plant(config: TableConfig, teeth: Teeth) -> control.StateSpace:
     """Return the sampled plant from duty and load to true and measured speed.
 
-    Inputs: `duty` on the bridge (1 is full), `load_Nm` against positive rotation at the table. Outputs: `speed_deg_s` of
-    the motor as the table would turn with it, `measured_deg_s`, its mean over the window. States: current, speed, and
-    the angle made in each of the last W ticks; as these are kept, and no angle, nothing integrates without end.
+    Inputs: `duty` on the bridge (1 is full), `load_Nm` against positive rotation at the table. Outputs: `speed_deg_s`
+    of the motor as the table would turn with it, `measured_deg_s`, its mean over the window. States: current, speed,
+    and the angle made in each of the last W ticks; as these are kept, and no angle, nothing integrates without end.
     """
     tick_s, window = 1.0 / config.control.tick_hz, config.control.speed_window_ticks
     motor = control.ss(*motor_system(config, teeth), np.eye(3), np.zeros((3, 2)))
@@ -85,7 +85,8 @@ def duty_gains(config: TableConfig, gains: Gains | Array) -> Array:
     """
     quantum_deg_s = speed_quantum_deg_s(config)
     scale = np.array([2.0**-GAIN_BITS, 2.0**-INTEGRAL_GAIN_BITS, 2.0**-GAIN_BITS])
-    return np.asarray(gains, dtype=np.float64) * scale / (duty_max(config) * quantum_deg_s)
+    result: Array = np.asarray(gains, dtype=np.float64) * scale / (duty_max(config) * quantum_deg_s)
+    return result
 
 
 def speed_quantum_deg_s(config: TableConfig) -> float:

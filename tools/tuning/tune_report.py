@@ -44,12 +44,13 @@ def tune_report(tuning: Tuning, drawings: dict[str, str]) -> str:
     blocks = [paragraph(_summary(tuning), "lead"), heading("Gains"), _gains_table(tuning)]
     blocks += [
         paragraph(
-            "u = K (e + integral(e) / Ti - Td d(speed)/dt), in the registers of the firmware; these are what is judged below.",
+            "u = K (e + integral(e) / Ti - Td d(speed)/dt), in the registers of the firmware; these are judged below.",
             "quiet",
         ),
         heading("Figures of the linear loop, and their bounds"),
         paragraph(
-            "Margins and noise are the worst of three states: the motor drives the table, the table drives the motor, the load is free within the backlash."
+            "Margins and noise are the worst of three states: the motor drives the table, the table drives "
+            "the motor, the load is free within the backlash."
         ),
     ]
     for tuned in (ramp, hold):
@@ -57,7 +58,8 @@ def tune_report(tuning: Tuning, drawings: dict[str, str]) -> str:
     blocks += [
         heading("On the emulator"),
         paragraph(
-            "The full table, with friction, stiction, backlash and quantisation, beside what the linear model foretells. Steps are the mean of 24 starts between two counts."
+            "The full table, with friction, stiction, backlash and quantisation, beside what the linear model "
+            "foretells. Steps are the mean of runs from many places between two counts."
         ),
         _checks_table(tuning),
         *[paragraph(text, "quiet") for text in _differences(tuning)],
@@ -70,7 +72,8 @@ def tune_report(tuning: Tuning, drawings: dict[str, str]) -> str:
         figure_block(drawings["nyquist"], "Nyquist plots; the circle is what the bound on Ms keeps free about -1."),
         heading("Spread of the plant"),
         paragraph(
-            f"{tuning.plants} tables whose constants lie uniformly within {100 * tuning.spread:.0f} % about the configured ones."
+            f"{tuning.plants} tables whose constants lie uniformly within "
+            f"{100 * tuning.spread:.0f} % about the configured ones."
         ),
         _spread_table(tuning),
         figure_block(
@@ -87,11 +90,14 @@ def _summary(tuning: Tuning) -> str:
     parts = [f"{tuned.title}: bounded by {_names(tuned.design.binding)}" for tuned in tuning.sets.values()]
     figures = [pair for before, after in tuning.checks for pair in zip(before.figures, after.figures, strict=True)]
     better = sum(new.emulator <= old.emulator for old, new in figures)
-    return f"Both sets keep all bounds ({'; '.join(parts)}). On the emulator {better} of {len(figures)} figures are as good as before or better."
+    return (
+        f"Both sets keep all bounds ({'; '.join(parts)}). On the emulator {better} of {len(figures)} figures are "
+        "as good as before or better."
+    )
 
 
 def _gains_table(tuning: Tuning) -> str:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for tuned in tuning.sets.values():
         for when, gains in (("before", tuned.before), ("tuned", tuned.design.gains)):
             rows.append((f"{tuned.title}, {when}", *_gain_cells(tuning, gains)))
@@ -107,7 +113,7 @@ def _gain_cells(tuning: Tuning, gains: Gains) -> tuple[str, ...]:
 
 
 def _figures_table(tuned: TunedSet) -> str:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for bound in tuned.design.bounds:
         after = _judged(bound, tuned.design.figures) + (" (binding)" if bound in tuned.design.binding else "")
         rows.append((bound.title, _limit(bound), _judged(bound, tuned.before_figures), after))
@@ -141,7 +147,7 @@ def _binding(tuned: TunedSet) -> str:
 
 
 def _checks_table(tuning: Tuning) -> str:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for before, after in tuning.checks:
         for old, new in zip(before.figures, after.figures, strict=True):
             mark = "+" if new.emulator < old.emulator else "!" if new.emulator > 1.001 * old.emulator else ""
@@ -169,8 +175,9 @@ def _differences(tuning: Tuning) -> list[str]:
     """Explain each figure in which emulator and model differ by more than a fifth."""
     quantum = speed_quantum_deg_s(tuning.before)
     return [
-        f"{figure.title}: {figure.emulator:.3g} {figure.unit} where the model foretells {figure.model:.3g}. The model has neither stiction nor "
-        f"backlash, and the firmware sees the speed in quanta of {quantum:.3g} deg/s, so answers smaller than some quanta are not linear."
+        f"{figure.title}: {figure.emulator:.3g} {figure.unit} where the model foretells {figure.model:.3g}. The model "
+        f"has neither stiction nor backlash, and the firmware sees the speed in quanta of {quantum:.3g} deg/s, so "
+        "answers smaller than some quanta are not linear."
         for _, after in tuning.checks
         for figure in after.figures
         if figure.model is not None and abs(figure.emulator - figure.model) > _AGREES_SHARE * abs(figure.model)
@@ -250,7 +257,7 @@ def _nyquist(tuning: Tuning) -> Drawing:
 def _spread_table(tuning: Tuning) -> str:
     ramp, hold = (tuned.spread for tuned in tuning.sets.values())
     shares = dict(ramp.shares)
-    rows = [
+    rows: list[tuple[str, ...]] = [
         (str(bound), f"{100 * shares[bound]:.1f} %" if bound in shares else "not asked", f"{100 * share:.1f} %")
         for bound, share in hold.shares
     ]
@@ -276,6 +283,7 @@ def _spread_figure(tuning: Tuning) -> Drawing:
 def _noise(tuning: Tuning) -> str:
     count_deg, duty = quantisation_noise(tuning.before)
     return (
-        f"The position is rounded to counts, a white noise of {count_deg:.2g} deg (standard deviation), which the regulator turns into the noise "
-        f"at the PWM that is bounded above. The PWM is rounded to steps, a white noise of {100 * duty:.2g} % duty at the plant's input."
+        f"The position is rounded to counts, a white noise of {count_deg:.2g} deg (standard "
+        "deviation), which the regulator turns into the noise at the PWM that is bounded above. The PWM is rounded to "
+        f"steps, a white noise of {100 * duty:.2g} % duty at the plant's input."
     )
