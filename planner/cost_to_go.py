@@ -78,7 +78,7 @@ def cost_to_go(problem: Problem, grid: Grid) -> CostToGo:
     Raises:
         GridError: that would be more than MOST_STATES.
     """
-    states = problem.map.location_count * len(grid.speeds_deg_s) * grid.angle_count
+    states = grid.state_count(problem.map.location_count)
     if states > MOST_STATES:
         raise GridError(
             f"the cost-to-go would have {states:,} states (locations x speeds x angles); allowed are {MOST_STATES:,}: "

@@ -30,8 +30,8 @@ STEPS_BACK_PER_COLUMN = 50
 # A free start is looked for at so many angles per sample of the map.
 STARTS_PER_SAMPLE = 4
 
-# Beyond so many states the grid without interpolation would take more than 200 MB.
-MOST_STATES = 50_000_000
+# A second, finer grid is tried if it has no more states: 200 MB.
+MOST_FINE_STATES = 50_000_000
 
 
 def dynamic_programming(problem: Problem, grid: Grid | None = None) -> Outcome:
@@ -43,20 +43,24 @@ def dynamic_programming(problem: Problem, grid: Grid | None = None) -> Outcome:
     obstacle = obvious_obstacle(problem, NAME)
     if obstacle is not None:
         return obstacle
-    for candidate in (default_grid(problem), fine_grid(problem)) if grid is None else (grid,):
+    for candidate in (default_grid(problem), *fine_grids(problem)) if grid is None else (grid,):
         plan = follow(problem, cost_to_go(problem, candidate))
         if plan is not None:
             return plan
     return NoPlan(NAME, Obstacle.UNREACHABLE, _first_unreachable_location(problem))
 
 
-def fine_grid(problem: Problem) -> Grid:
-    """Return the exact grid that has four changes of speed each way; where that is too fine, an interpolated one."""
+def fine_grids(problem: Problem) -> list[Grid]:
+    """Return the grid to try where the default one finds no way, if it fits into the memory set aside for it.
+
+    That is the exact grid with four changes of speed each way; where that is too fine, an interpolated one.
+    """
     step_deg = problem.limits.acceleration_deg_s2 * problem.step_s**2 / 8.0
     exact = exact_grid(problem, math.ceil(problem.map.angle_step_deg / step_deg))
-    if problem.map.location_count * len(exact.speeds_deg_s) * exact.angle_count <= MOST_STATES:
-        return exact
-    return default_grid(problem, refinement=4, speed_count=201, jump_count=41)
+    interpolated = default_grid(problem, refinement=4, speed_count=201, jump_count=41)
+    columns = problem.map.location_count
+    fitting = [grid for grid in (exact, interpolated) if grid.state_count(columns) <= MOST_FINE_STATES]
+    return fitting[:1]
 
 
 def follow(problem: Problem, to_go: CostToGo) -> Plan | None:

@@ -65,7 +65,7 @@ def _first_limit(arm: FloatArray, joints: FloatArray, slot: int) -> int:
 
 
 @kernel
-def _solve_wrist(
+def _solve_wrist(  # noqa: PLR0917 - kernels take numbers and arrays, not objects
     arm: FloatArray,
     T_BF: FloatArray,
     c1: float,
@@ -110,7 +110,7 @@ def _solve_wrist(
 
 
 @kernel
-def _solve_elbows(
+def _solve_elbows(  # noqa: PLR0917 - kernels take numbers and arrays, not objects
     arm: FloatArray,
     T_BF: FloatArray,
     joint_1: float,

@@ -41,6 +41,10 @@ class Grid(NamedTuple):
         top_deg_s = self.half_count * self.speed_step_deg_s
         return np.linspace(-top_deg_s, top_deg_s, 2 * self.half_count + 1)
 
+    def state_count(self, column_count: int) -> int:
+        """Return the number of states of a cost-to-go over so many columns."""
+        return column_count * (2 * self.half_count + 1) * self.angle_count
+
 
 def ladder(reach: int, count: int) -> IndexArray:
     """Return up to `count` changes of speed within `reach` grid steps: odd, symmetric, with 0, denser near 0."""

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from planner.config_map import ConfigurationMap
 from planner.cost import Weights
 from planner.cost_to_go import cost_to_go
-from planner.dynamic_programming import dynamic_programming, follow
+from planner.dynamic_programming import MOST_FINE_STATES, dynamic_programming, fine_grids, follow
 from planner.motion import Limits, motion_through_angles
 from planner.plan import NoPlan, Obstacle, Plan, path_cost
 from planner.problem import Problem
@@ -144,6 +144,16 @@ def test_a_corridor_that_drifts_faster_than_the_table_turns_is_unreachable_and_s
     assert outcome.location is not None
     assert 10 <= outcome.location <= 14
     assert isinstance(dynamic_programming(Problem(ConfigurationMap(values[: outcome.location]), step_s=0.1)), Plan)
+
+
+def test_a_long_map_without_a_way_is_a_result_and_takes_no_second_grid_beyond_its_memory() -> None:
+    values = np.ones((400, 360))
+    values[300, :180], values[301, 180:] = 0.0, 0.0
+    problem = Problem(ConfigurationMap(values), step_s=0.1)
+    assert all(grid.state_count(400) <= MOST_FINE_STATES for grid in fine_grids(problem))
+    outcome = dynamic_programming(problem)
+    assert isinstance(outcome, NoPlan)
+    assert outcome.location == 301
 
 
 def test_a_corridor_one_sample_wide_is_followed() -> None:
