@@ -15,7 +15,7 @@ from protocol.conformance.verdict import Measurement, NonconformityError, Verdic
 from protocol.conformance.wire import Event, RecordedPort, Wire
 
 _CANCEL = b"\x18\r"
-_POSITION = re.compile(rb"(?:^|\r)H (-?[0-9]+\.[0-9]+) *\r")
+_POSITION = re.compile(rb"(?:^|[\r\n])H (-?[0-9]+\.[0-9]+) *\r")
 _SETTLE_S = 0.3
 
 
@@ -96,6 +96,7 @@ class Session:
             if case.travel_deg or POWER_CYCLE in case.needs:
                 rig.go_home()
             case.run(rig)
+            rig.silence("after its last reply the table")
             self._restore(case, rig)
         except NonconformityError as error:
             self._after_failure(case)

@@ -23,7 +23,7 @@ def lf_is_ignored(rig: Rig) -> None:
     rig.wire.send(b"\n")
     rig.silence("a lone LF")
     too_fast = b"%d" % (10 * rig.profile.limits.speed_deg_s + 10)
-    rig.refused(b"S " + too_fast[:-1] + b"\n" + too_fast[-1:], ErrorCode.OUT_OF_RANGE)
+    rig.refused(b"S " + too_fast[:1] + b"\n" + too_fast[1:], ErrorCode.OUT_OF_RANGE)
 
 
 @case("3.1/3")

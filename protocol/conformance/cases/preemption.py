@@ -6,10 +6,10 @@ from protocol.conformance.rig import Rig
 
 @case("7.3/1", travel_deg=30)
 def a_new_target_replaces_the_old(rig: Rig) -> None:
-    """Halfway to 30 be sent to 20, then on to 30 again."""
+    """On the way to 30 be sent to a place much nearer, then on to 30 again."""
     _under_way(rig, 30)
-    rig.move_to(20)
-    rig.follow(0.3)
+    rig.move_to(10)
+    rig.follow(0.5)
     rig.move_to(30)
     rig.finish()
 
