@@ -46,8 +46,8 @@ class Settings(NamedTuple):
         look_s: the same for looks from inside.
     """
 
-    lag_s: float = 0.0096
-    lead_s: float = 0.0096
+    lag_s: float = 0.0058
+    lead_s: float = 0.0
     tolerance_deg: float = 1.0
     drift_deg: float = 0.1
     drift_filter_s: float = 3.0
@@ -239,7 +239,8 @@ class _Run:
         if before is None or command.speed_deg_s != before.speed_deg_s:
             self._table.set_speed(command.speed_deg_s)
         self._latched = command
-        due_s = timed.time_s - self._settings.lead_s - self._wire.seconds(self._target_bytes(command))
+        under_way_s = self._wire.seconds(self._target_bytes(command)) + self._wire.latency_s
+        due_s = timed.time_s - self._settings.lead_s - under_way_s
         self._sleep_until(due_s)
         late_s = self._now_s() - due_s
         if late_s > LATEST_S:
@@ -253,7 +254,8 @@ class _Run:
 
     def _prepare_s(self, timed: TimedCommand) -> float:
         """Return when the lines of a command have to begin."""
-        return timed.time_s - self._settings.lead_s - exchanges_s(self._wire, timed.command, self._latched) - _SLACK_S
+        needed_s = exchanges_s(self._wire, timed.command, self._latched) + self._wire.latency_s + _SLACK_S
+        return timed.time_s - self._settings.lead_s - needed_s
 
     def _target_bytes(self, command: MotionCommand) -> int:
         return len(command_line(Verb.MOVE_TO, command.target_deg, self._wire))
@@ -280,8 +282,8 @@ class _Run:
         column, _ = self._pending_columns.pop(0)
         time_s = self._now_s()
         if self._view is not None:
-            self._look(column)
             self._view.trigger()
+            self._look(column)
         self._see(Observation(time_s, "L", self._table.latched_deg(), column))
 
     def _poll(self) -> None:

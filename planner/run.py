@@ -30,6 +30,7 @@ class RunOptions(NamedTuple):
     tolerance_deg: float = DEFAULT_TOLERANCE_DEG
     control: Path | None = None
     arm_is_away: bool = False
+    time_scale: float = 1.0
     pause_times: PauseTimes = PauseTimes()
 
 
@@ -56,7 +57,7 @@ def run_plan(
     out.mkdir(parents=True, exist_ok=True)
     copy_input(out, plan_file, map_file)
     with ExitStack() as stack:
-        port = open_port(options.port, options.baud, options.timeout_s)
+        port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
         table = stack.enter_context(TableClient(port, options.timeout_s, options.decimals))
         view = _view(options.control, port, stack)
         position_deg = table.position_deg()

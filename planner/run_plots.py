@@ -10,6 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from planner.arrays import FloatArray
 from planner.map_colours import coloured
@@ -89,18 +90,24 @@ def plot_run(run: StoredRun, checked: RunVerification, file: Path) -> None:
 def draw_map(axes: Axes, run: StoredRun, checked: RunVerification) -> None:
     """Draw the map, grey where allowed, with both paths and the touched cells."""
     configuration_map = run.run_input.problem.map
-    image, _ = coloured(configuration_map)
+    image, reasons = coloured(configuration_map)
     half_deg = 0.5 * configuration_map.angle_step_deg
     extent = (-0.5, configuration_map.location_count - 0.5, -half_deg, 360.0 - half_deg)
     axes.imshow(image, origin="lower", aspect="auto", interpolation="nearest", extent=extent)
-    _draw_wrapped(axes, run.run_input.plan.angles_deg, PLANNED, 4.0, "planned")
-    _draw_wrapped(axes, checked.located_deg, EXECUTED, 1.4, "executed (encoder)")
+    _draw_wrapped(axes, run.run_input.plan.angles_deg, PLANNED, 4.5, "planned")
+    _draw_wrapped(axes, checked.located_deg, "black", 1.1, "executed (encoder)")
     for step in checked.forbidden_steps:
         axes.axvspan(step, step + 1, color="#ff0000", alpha=0.4, linewidth=0.0)
     for pause in run.run_input.plan.pauses:
         axes.axvline(pause.step + 0.5, color=PAUSE, linewidth=1.0)
     axes.set(xlabel="scan location", ylabel="table angle (deg)", yticks=range(0, 361, 60), ylim=(0.0, 359.9))
-    axes.legend(loc="upper right", frameon=True, framealpha=0.9)
+    patches = [Patch(facecolor=entry.colour, label=entry.text) for entry in reasons]
+    axes.legend(
+        handles=[*axes.get_legend_handles_labels()[0], *patches],
+        loc="upper left",
+        bbox_to_anchor=(1.01, 1.0),
+        fontsize=8.5,
+    )
 
 
 def draw_angle(axes: Axes, run: StoredRun) -> None:

@@ -78,7 +78,7 @@ def _summary(run: StoredRun, checked: RunVerification) -> Iterator[tuple[str, st
     yield "margin left to a forbidden cell", f"{checked.margin_deg:.2f} deg"
     yield "latest command", f"{1000.0 * checked.latest_command_s:.1f} ms late"
     yield "locations without a trigger", f"{len(checked.missing_triggers)}"
-    yield "sent ahead by", f"{1000.0 * conditions.lead_s:g} ms, the encoder's lag"
+    yield "commands sent ahead by", f"{1000.0 * conditions.lead_s:g} ms"
     if run.record.sent:
         yield "if the line had died", f"at most {_longest_run_on_deg(run):.0f} deg until the table stood by itself"
 

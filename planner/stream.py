@@ -47,11 +47,13 @@ class Wire(NamedTuple):
         baud: 10 bits a byte; 0 where bytes take no time.
         turnaround_s: from the end of a command to the start of the next beyond the time of the bytes: what driver,
             adapter and operating system take.
+        latency_s: from the arrival of a CR to its effect: a tick of the firmware, and clocks that tell whole ticks.
     """
 
     decimals: int = 1
     baud: int = 9600
     turnaround_s: float = 0.002
+    latency_s: float = 0.0015
 
     @property
     def quantum(self) -> float:

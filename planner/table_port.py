@@ -2,14 +2,36 @@
 
 import serial
 
-from protocol import Port, PortError
+from protocol import Clock, Port, PortError, WallClock
 
 # The stand-in's port `emulator://` is found by pyserial wherever the stand-in is installed; nothing of it is used here.
 _STAND_IN = "emulator"
 
 
-def open_port(url: str, baud: int, timeout_s: float) -> Port:
+class ScaledClock:
+    """The time of a stand-in that runs faster or slower than real."""
+
+    def __init__(self, clock: Clock, time_scale: float) -> None:
+        """Count `time_scale` seconds in each of `clock`'s."""
+        self._clock, self._time_scale = clock, time_scale
+
+    def now_s(self) -> float:
+        """Return the stand-in's seconds since an arbitrary but fixed moment."""
+        return self._clock.now_s() * self._time_scale
+
+    def sleep_s(self, duration_s: float) -> None:
+        """Return when so much of the stand-in's time has passed."""
+        self._clock.sleep_s(duration_s / self._time_scale)
+
+
+def open_port(url: str, baud: int, timeout_s: float, time_scale: float = 1.0) -> Port:
     """Return an open port: a device, or any URL of pyserial's.
+
+    Args:
+        url: what to open.
+        baud: bits a second.
+        timeout_s: for reading and writing.
+        time_scale: that of the stand-in behind the port; the port's clock then runs like the stand-in's.
 
     Raises:
         PortError: it cannot be opened.
@@ -22,4 +44,6 @@ def open_port(url: str, baud: int, timeout_s: float) -> Port:
         raise PortError(
             f"cannot open {url} at {baud} baud: {error}; check the name, the rights and the table"
         ) from error
+    if time_scale != 1.0:
+        port.clock = ScaledClock(WallClock(), time_scale)  # type: ignore[attr-defined] # where clients look for one
     return port

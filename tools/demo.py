@@ -1,74 +1,63 @@
 """The main job, on real input: `python -m tools.demo --out DIR`.
 
-Starts the stand-in as a program of its own, opens the port that it prints with pyserial, drives a motion that new
-commands pre-empt again and again (Fig. 4 of the paper), and draws what the table did.
+Plans the shipped scan of a cylinder, starts a stand-in table on a pty as a program of its own, streams the plan to it,
+proves from what came back that the motion was the planned one, and names the page that shows it all.
+`python -m tools.demo preemption --out DIR` draws Fig. 4 of the paper instead.
 """
 
 import argparse
-import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
-from emulator.trace import read_trace
-from protocol import TableClient, TableError
-from tools.plot_trace import draw_trace, save_figure
+from planner.__main__ import main as planner
+from protocol import TableError
+from tools.preemption import draw_preemption, stand_in
 
-STEPS = (  # after how many seconds, top speed deg/s, acceleration deg/s2, target deg
-    (0.0, 20.0, 20.0, 60.0),
-    (1.8, 35.0, 40.0, 120.0),  # faster, in full motion
-    (0.9, 10.0, 40.0, 120.0),  # slower: it brakes at A, no step
-    (1.4, 30.0, 30.0, 20.0),  # behind: it brakes, turns and comes back
-    (1.6, 15.0, 60.0, 45.0),  # behind again
-)
-END_DEG = STEPS[-1][-1]
+SCAN = "cylinder"
+TIME_SCALE = 2.0
+"""The stand-in runs this much faster than real, so that nobody waits for a scan of 47 s."""
+LEAD_S = 0.0058
+"""How far the stand-in's encoder runs behind its reference."""
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run the demonstration and return the exit status."""
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the demonstration and return the exit status: 0 when the motion was verified."""
     parser = argparse.ArgumentParser(
         prog="python -m tools.demo",
-        description="Drive the stand-in over a pseudo-terminal and draw what it did.",
+        description="Plan a scan, stream it to a stand-in table on a pseudo-terminal, and verify the motion.",
         epilog="example: python -m tools.demo --out build/demo",
     )
-    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="where trace and picture go")
-    out = parser.parse_args(arguments).out
+    parser.add_argument("job", choices=("scan", "preemption"), nargs="?", default="scan", help="default: scan")
+    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="where the results go")
+    options = parser.parse_args(arguments)
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        with _stand_in(out / "trace.csv") as port, TableClient.open(port) as table:
-            _drive(table)
-        trace = read_trace(out / "trace.csv")
-        figure = draw_trace(trace, "A motion pre-empted in full run: the reference's speed never jumps")
-        save_figure(figure, out / "preemption.png")
+        options.out.mkdir(parents=True, exist_ok=True)
+        if options.job == "preemption":
+            print(draw_preemption(options.out))
+            return 0
+        return scan_on_a_pty(options.out)
     except (OSError, TableError) as error:
         print(f"demo: {error}", file=sys.stderr)
         return 2
-    print(out / "preemption.png")
-    return 0
 
 
-def _drive(table: TableClient) -> None:
-    for wait_s, speed_deg_s, acceleration_deg_s2, target_deg in STEPS:
-        table.clock.sleep_s(wait_s)
-        table.set_speed(speed_deg_s)
-        table.set_acceleration(acceleration_deg_s2)
-        table.move_to(target_deg)
-        _say(f"at {table.position_deg():6.1f} deg: S {speed_deg_s}, A {acceleration_deg_s2}, P {target_deg}")
-    reached_deg = table.wait_until_at(END_DEG)
-    _say(f"at {reached_deg:6.1f} deg: arrived")
-
-
-@contextmanager
-def _stand_in(trace: Path) -> Iterator[str]:
-    """Run the stand-in on a pty and yield the pty's name; the trace is complete afterwards."""
-    command = [sys.executable, "-m", "emulator", "--pty", "--trace", str(trace)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        try:
-            yield process.stdout.readline().strip()
-        finally:
-            process.terminate()
+def scan_on_a_pty(out: Path) -> int:
+    """Plan, run, verify and show the scan; return the first exit status that is not 0."""
+    for command in (["map", SCAN, "--out", str(out)], ["plan", SCAN, "--out", str(out)]):
+        _say(f"python -m planner {' '.join(command)}")
+        if status := planner(command):
+            return status
+    # The path of a socket must be short, that of `out` may not be.
+    with tempfile.TemporaryDirectory() as folder:
+        control = str(Path(folder) / "control")
+        with stand_in("--pty", "--control", control, "--time-scale", f"{TIME_SCALE:g}") as port:
+            command = ["run", str(out / "plan.json"), "--port", port, "--control", control, "--arm-away"]
+            command += ["--time-scale", f"{TIME_SCALE:g}", "--lead", f"{LEAD_S:g}", "--out", str(out / "run")]
+            _say(f"python -m planner {' '.join(command)}")
+            status = planner(command)
+    return planner(["show", str(out / "run")]) or status
 
 
 def _say(sentence: str) -> None:

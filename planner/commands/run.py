@@ -52,6 +52,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="the arm is drawn back until the table stands at the start: any way there is free",
     )
     parser.add_argument(
+        "--time-scale", type=float, default=1.0, metavar="X", help="that of the stand-in at the port, if it is not 1"
+    )
+    parser.add_argument(
         "--control", metavar="PATH", type=Path, help="the control channel of a stand-in, to see inside it"
     )
     parser.set_defaults(run=run)
@@ -68,6 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
         tolerance_deg=arguments.tolerance,
         control=arguments.control,
         arm_is_away=arguments.arm_away,
+        time_scale=arguments.time_scale,
     )
     show = progress_line("run", sys.stderr)
     try:

@@ -1,0 +1,67 @@
+"""A motion that new commands pre-empt again and again (Fig. 4 of the paper), on a real pty, drawn.
+
+Starts the stand-in as a program of its own and opens the port that it prints with pyserial.
+"""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from emulator.trace import read_trace
+from protocol import TableClient
+from tools.plot_trace import draw_trace, save_figure
+
+STEPS = (  # after how many seconds, top speed deg/s, acceleration deg/s2, target deg
+    (0.0, 20.0, 20.0, 60.0),
+    (1.8, 35.0, 40.0, 120.0),  # faster, in full motion
+    (0.9, 10.0, 40.0, 120.0),  # slower: it brakes at A, no step
+    (1.4, 30.0, 30.0, 20.0),  # behind: it brakes, turns and comes back
+    (1.6, 15.0, 60.0, 45.0),  # behind again
+)
+END_DEG = STEPS[-1][-1]
+
+
+def draw_preemption(out: Path) -> Path:
+    """Drive the motion over a pty, and return the picture of what the table did; trace and picture go to `out`.
+
+    Raises:
+        OSError: the stand-in cannot be started, or a file cannot be written.
+        TableError: the table did not do its part.
+    """
+    with stand_in("--pty", "--trace", str(out / "trace.csv")) as port, TableClient.open(port) as table:
+        _drive(table)
+    figure = draw_trace(
+        read_trace(out / "trace.csv"), "A motion pre-empted in full run: the reference's speed never jumps"
+    )
+    picture = out / "preemption.png"
+    save_figure(figure, picture)
+    return picture
+
+
+def _drive(table: TableClient) -> None:
+    for wait_s, speed_deg_s, acceleration_deg_s2, target_deg in STEPS:
+        table.clock.sleep_s(wait_s)
+        table.set_speed(speed_deg_s)
+        table.set_acceleration(acceleration_deg_s2)
+        table.move_to(target_deg)
+        _say(f"at {table.position_deg():6.1f} deg: S {speed_deg_s}, A {acceleration_deg_s2}, P {target_deg}")
+    reached_deg = table.wait_until_at(END_DEG)
+    _say(f"at {reached_deg:6.1f} deg: arrived")
+
+
+@contextmanager
+def stand_in(*arguments: str) -> Iterator[str]:
+    """Run the stand-in as a program of its own and yield its port's name; what it records is complete afterwards."""
+    command = [sys.executable, "-m", "emulator", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        try:
+            yield process.stdout.readline().strip()
+        finally:
+            process.terminate()
+
+
+def _say(sentence: str) -> None:
+    print(f"demo: {sentence}", file=sys.stderr, flush=True)
