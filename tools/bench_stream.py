@@ -1,0 +1,139 @@
+"""How exactly a plan arrives at the table: the stream alone, the shipped scans, and random plans in virtual time."""
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.cost import PathCost
+from planner.execute import Settings
+from planner.motion import Limits, roll_out
+from planner.plan import Plan
+from planner.scan import shipped_scans
+from planner.stream import TimedCommand, Wire, reference_states, rounded_stream, stream
+from planner.table_motion import TableMotion
+from tools.timing import print_table
+from tools.virtual_run import VirtualRun, random_run_inputs, run_in_virtual_time, shipped_run_input
+
+RANDOM_PLANS = 200
+LEAD_S = 0.0058
+OFF = (0.8, 1.2)
+PLANT = {
+    "motor.resistance_ohm": 2.18,
+    "motor.torque_constant_Nm_A": 23.4e-3,
+    "motor.rotor_inertia_kg_m2": 1.03e-6,
+    "gears.efficiency": 0.6,
+    "gears.backlash_arcmin": 10.0,
+    "table.inertia_kg_m2": 0.3125,
+    "table.bearing_friction_Nm": 0.1,
+    "friction.coulomb_Nm": 1.15e-3,
+}
+
+
+def bench_stream(stream: TextIO) -> None:
+    """Print every figure of streaming and execution."""
+    _bench_rounding(stream)
+    _bench_shipped(stream)
+    _bench_plant(stream)
+    _bench_random(stream)
+
+
+def random_plan(generator: np.random.Generator, step_s: float, duration_s: float, limits: Limits) -> Plan:
+    """Return a smooth random motion from rest, within the limits."""
+    steps = round(duration_s / step_s)
+    accelerations, speed = np.empty(steps), 0.0
+    for k in range(steps):
+        wanted = 0.2 * limits.acceleration_deg_s2 * generator.standard_normal() - 0.5 * speed
+        reach = limits.speed_deg_s - abs(speed) if speed * wanted > 0.0 else limits.speed_deg_s
+        accelerations[k] = np.clip(wanted, -reach / step_s, reach / step_s)
+        accelerations[k] = np.clip(accelerations[k], -limits.acceleration_deg_s2, limits.acceleration_deg_s2)
+        speed += accelerations[k] * step_s
+    start = float(np.round(generator.uniform(0.0, 360.0), 1))
+    angles, speeds = roll_out(start, 0.0, accelerations, step_s)
+    return Plan("random", "", step_s, angles, speeds, accelerations, PathCost(0.0, 0.0, 0.0))
+
+
+def errors_at_locations(plan: Plan, limits: Limits, streamed: Callable[..., Sequence[TimedCommand]]) -> FloatArray:
+    """Return how far the reference is from a plan at each location, by the controller's own rules."""
+    motion = TableMotion(plan, limits)
+    states = reference_states(streamed(motion, limits, Wire()), motion.column_times_s)
+    return np.array([state.angle_deg for state in states]) - plan.angles_deg
+
+
+def _bench_rounding(out: TextIO) -> None:
+    limits, rows = Limits(), []
+    for step_s in (0.1, 0.5, 1.0):
+        generator = np.random.default_rng(0)
+        plans = [random_plan(generator, step_s, 60.0, limits) for _ in range(20)]
+        for name, streamed in (("fed back", stream), ("each rounded on its own", rounded_stream)):
+            worst = [float(np.abs(errors_at_locations(plan, limits, streamed)).max()) for plan in plans]
+            rows.append((f"{step_s:g} s, {name}", f"{np.median(worst):.4f}", f"{max(worst):.4f}"))
+    print_table(
+        out, "Reference against the plan, 20 random minutes, one decimal", ("step", "median", "worst deg"), rows
+    )
+
+
+def _bench_shipped(out: TextIO) -> None:
+    rows = []
+    for name in shipped_scans():
+        run_input = shipped_run_input(name)
+        for lead_s in (0.0, LEAD_S):
+            run = run_in_virtual_time(run_input, settings=Settings(lead_s=lead_s))
+            rows.append((f"{name}, sent {1000.0 * lead_s:g} ms ahead", *_figures(run)))
+    print_table(out, "Shipped scans in virtual time, worst deg at the locations", ("scan", *_HEADER), rows)
+
+
+def _bench_plant(out: TextIO) -> None:
+    run_input = shipped_run_input("cylinder")
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, value in PLANT.items():
+            for factor in OFF:
+                section, key = name.split(".")
+                config = Path(folder) / "plant.toml"
+                config.write_text(f"[{section}]\n{key} = {factor * value!r}\n", encoding="utf-8")
+                for lead_s in (0.0, LEAD_S):
+                    run = run_in_virtual_time(run_input, f"emulator://?config={config}", Settings(lead_s=lead_s))
+                    rows.append((f"{name} x {factor:g}, {1000.0 * lead_s:g} ms ahead", *_figures(run)))
+    print_table(out, "Cylinder scan with other plants", ("plant", *_HEADER), rows)
+
+
+_HEADER = ("reference, as sent", "encoder", "true", "cells", "late ms", "over real time")
+
+
+def _figures(run: VirtualRun) -> tuple[str, ...]:
+    checked = run.checked
+    return (
+        *(f"{checked.deviations[name].at_locations_deg:.4f}" for name in ("reference", "encoder", "true")),
+        str(len(checked.forbidden_steps)),
+        f"{1000.0 * checked.latest_command_s:.1f}",
+        f"{run.simulated_s / run.real_s:.0f} x",
+    )
+
+
+def _bench_random(out: TextIO) -> None:
+    rows = []
+    for name, margin, lead_s in (
+        ("planned one sample clear", 1, 0.0),
+        ("planned one sample clear, 5.8 ms ahead", 1, LEAD_S),
+        ("planned up to the cells", 0, LEAD_S),
+    ):
+        runs = [
+            run_in_virtual_time(each, settings=Settings(lead_s=lead_s))
+            for each in random_run_inputs(RANDOM_PLANS, margin)
+        ]
+        worst = [
+            max(run.checked.deviations[name].at_locations_deg for run in runs) for name in ("reference", "encoder")
+        ]
+        touched = sum(bool(run.checked.forbidden_steps) for run in runs)
+        stopped = sum(run.checked.failure is not None for run in runs)
+        late_ms = 1000.0 * max(run.checked.latest_command_s for run in runs)
+        speed = sum(run.simulated_s for run in runs) / sum(run.real_s for run in runs)
+        rows.append(
+            (name, *(f"{each:.4f}" for each in worst), str(touched), str(stopped), f"{late_ms:.1f}", f"{speed:.0f} x")
+        )
+    header = ("plans", "reference, as sent", "encoder", "touched a cell", "stopped", "late ms", "over real time")
+    print_table(out, f"{RANDOM_PLANS} random plans of 10 s at 0.1 s steps, virtual time", header, rows)

@@ -1,0 +1,101 @@
+"""Run a plan on a simulated table in virtual time: what benchmarks and tests have in common."""
+
+import time
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+import emulator  # noqa: F401 - teaches pyserial the port emulator://
+from planner.config_map import ConfigurationMap
+from planner.configuration import Configuration
+from planner.dynamic_programming import dynamic_programming
+from planner.execute import Record, Settings, bring_to, execute
+from planner.inside_view import view_of
+from planner.map_builder import build_maps
+from planner.map_problem import map_problem
+from planner.motion import Limits
+from planner.plan import NoPlan
+from planner.problem import Problem
+from planner.run_input import RunInput
+from planner.run_verification import RunVerification, verify_run
+from planner.scan import load_scan
+from planner.stream import Wire
+from planner.synthetic_maps import MapFamily, synthetic_map
+from planner.table_motion import TableMotion
+from planner.table_port import open_port
+from protocol import TableClient
+
+
+class VirtualRun(NamedTuple):
+    """A run, and how long it took: in the table's time, and by the wall clock."""
+
+    record: Record
+    checked: RunVerification
+    simulated_s: float
+    real_s: float
+
+
+def run_in_virtual_time(
+    run_input: RunInput, url: str = "emulator://", settings: Settings | None = None, wire: Wire | None = None
+) -> VirtualRun:
+    """Run a plan on a table of its own, and verify it."""
+    settings, wire = settings or Settings(), wire or Wire()
+    limits = run_input.problem.limits
+    motion = TableMotion(run_input.plan, limits)
+    begin_s = time.perf_counter()
+    port = open_port(url, wire.baud, timeout_s=0.5)
+    with TableClient(port, timeout_s=0.5, decimals=wire.decimals) as table:
+        bring_to(table, round(motion.start_deg, wire.decimals), limits, wire)
+        record = execute(table, motion, limits, wire, settings, view_of(port))
+        simulated_s = table.clock.now_s()
+    real_s = time.perf_counter() - begin_s
+    return VirtualRun(record, verify_run(run_input, motion, record, settings.lead_s), simulated_s, real_s)
+
+
+def shipped_run_input(name: str) -> RunInput:
+    """Return the optimal plan of a shipped scan, in its usual arm configuration."""
+    scan = load_scan(name)
+    configuration = Configuration.parse("LEFTY-ABOVE-NOFLIP")
+    configuration_map = build_maps(map_problem(scan), [configuration], 360)[configuration]
+    limits = Limits(scan.limits.speed_deg_s, scan.limits.acceleration_deg_s2)
+    problem = Problem(configuration_map, scan.path.step_s, limits)
+    return _run_input(name, problem, problem)
+
+
+def random_run_inputs(count: int, margin: int = 1, step_s: float = 0.1) -> Iterator[RunInput]:
+    """Yield plans across random maps of several kinds; maps that nobody can cross are passed over.
+
+    Args:
+        count: how many.
+        margin: samples by which the forbidden regions are widened for planning, so that the motion may deviate.
+        step_s: from one location to the next.
+    """
+    seed = 0
+    while count:
+        family = MapFamily(forbidden=0.15 + 0.05 * (seed % 4), slope=(0.0, 0.4, -0.8)[seed % 3], angle_count=360,
+                           obstacle_size=8.0)  # fmt: skip
+        configuration_map = synthetic_map(family, seed)
+        problem = Problem(configuration_map, step_s)
+        try:
+            yield _run_input(f"random map {seed}", Problem(widened(configuration_map, margin), step_s), problem)
+            count -= 1
+        except LookupError:
+            pass
+        seed += 1
+
+
+def widened(configuration_map: ConfigurationMap, samples: int) -> ConfigurationMap:
+    """Return the map with its forbidden regions some samples wider along the angle."""
+    allowed = configuration_map.allowed
+    for shift in range(-samples, samples + 1):
+        allowed = allowed & np.roll(configuration_map.allowed, shift, axis=1)
+    return ConfigurationMap(np.where(allowed, configuration_map.values, 0.0))
+
+
+def _run_input(name: str, asked: Problem, problem: Problem) -> RunInput:
+    """Return the plan of the problem `asked`, to be judged by `problem`; LookupError where there is none."""
+    plan = dynamic_programming(asked)
+    if isinstance(plan, NoPlan):
+        raise LookupError(plan.reason)
+    return RunInput(name, plan, problem, np.zeros((len(plan.angles_deg), 6)), {})
