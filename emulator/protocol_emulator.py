@@ -107,6 +107,8 @@ class Serial(SerialBase):
         deadline = self._deadline(self.timeout)
         while len(self._received) < size and self._advance_to_byte(deadline):
             pass
+        if not self._received:
+            self._require_line()
         return self._take(size)
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:

@@ -60,9 +60,9 @@ def test_other_settings_of_the_line_conform_too(query: str, serial_keys: str, tm
 
 
 def test_the_same_seed_gives_the_same_bytes_at_the_same_times() -> None:
-    first, second = (run("emulator://", load_profile(), ["7.3/7", "4.1/11"], seed=5) for _ in range(2))
+    first, second = (run("emulator://", load_profile(), ["7.3/7"], seed=5) for _ in range(2))
     assert [outcome.wire for outcome in first] == [outcome.wire for outcome in second]
-    assert first[0].wire != run("emulator://", load_profile(), ["7.3/7", "4.1/11"], seed=6)[0].wire
+    assert first[0].wire != run("emulator://", load_profile(), ["7.3/7"], seed=6)[0].wire
 
 
 def test_a_session_ends_where_it_began() -> None:
@@ -110,8 +110,8 @@ def test_a_port_that_dies_is_an_error_of_the_case() -> None:
     port = port_to(Mutant)
     session = Session(RecordedPort(port), load_profile(), InProcess(port.table))
     port.table.inject(fault_from("hang-up", {"at_s": port.clock.now_s() + 0.5}))
-    outcomes = session.run(chosen_cases(["7.1/1", "2.1/2"]))
-    assert [outcome.verdict for outcome in outcomes] == [Verdict.ERROR] * 3
+    outcomes = session.run(chosen_cases(["7.1/1"]))
+    assert [outcome.verdict for outcome in outcomes] == [Verdict.ERROR] * 2
     assert "the device has gone" in outcomes[0].reason
 
 
@@ -142,7 +142,7 @@ def rig_on(port: Serial, seed: int) -> Rig:
     return Rig(Wire(RecordedPort(port)), profile, InProcess(port.table), 0, Random(seed))
 
 
-@pytest.mark.parametrize("wrong", ["R counts from the old target", "S acts at once on the running motion", "-0.0"])
+@pytest.mark.parametrize("wrong", ["R counts from the old target", "-0.0", "CAN is passed over, and the half line carried out"])
 def test_a_random_walk_finds_what_is_wrong_and_shrinks_it(wrong: str) -> None:
     for seed in range(6):
         try:

@@ -1,0 +1,155 @@
+"""The command line: records, reports, replays, exit statuses, and one clear line for what cannot be."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from protocol.conformance.__main__ import main
+
+TOO_STRICT = "[tolerance]\nspeed_share = 0.0001\n"
+
+
+def conformance(*words: str | Path) -> int:
+    return main([str(word) for word in words])
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return tmp_path / "out"
+
+
+def test_a_run_leaves_a_record_a_report_and_junit(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert conformance("--port", "emulator://", "--case", "7.1/1", "--case", "5.4", "--out", out) == 0
+    assert capsys.readouterr().out.endswith("2 pass, 2 skipped\n")
+    record = json.loads((out / "record.json").read_text())
+    assert record["verdicts"] == {"pass": 2, "skipped": 2}
+    assert record["profile"]["limits"]["speed_deg_s"] == 40.0
+    (case, *_) = [case for case in record["cases"] if case["id"] == "7.1/1"]
+    assert case["clause"].startswith("A motion from rest accelerates at A")
+    assert {"top speed", "acceleration"} <= {measurement["name"] for measurement in case["measurements"]}
+    assert [way for _, way, _ in case["wire"][:2]] == ["sent", "received"]
+    suite = ET.parse(out / "junit.xml").getroot()[0]  # noqa: S314 - our own file
+    assert (suite.get("tests"), suite.get("failures"), suite.get("skipped")) == ("4", "0", "2")
+    report = (out / "report.html").read_text()
+    assert "<svg" in report
+    assert "http" not in report  # one file, which asks for nothing
+    assert sorted(path.name for path in out.iterdir()) == ["junit.xml", "record.json", "report.html"]
+
+
+def test_in_simulated_time_a_run_gives_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        conformance("--port", "emulator://", "--case", "7.3", "--out", tmp_path / name)
+    assert (tmp_path / "one" / "record.json").read_bytes() == (tmp_path / "two" / "record.json").read_bytes()
+
+
+def test_a_failure_says_which_clause_and_how_to_repeat_it(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    profile = tmp_path / "table.toml"
+    profile.write_text(TOO_STRICT)
+    words = ("--port", "emulator://", "--profile", profile, "--case", "7.1", "--seed", "3", "--out", out)
+    assert conformance(*words) == 1
+    printed = capsys.readouterr().out
+    assert "fail      7.1/1: top speed" in printed
+    assert "must: A motion from rest accelerates at A up to S" in printed
+    again = next(line for line in printed.splitlines() if "again: " in line and "7.1/1 " in line)
+    command = again.partition("again: python ")[2].split()
+    result = subprocess.run([sys.executable, *command], capture_output=True, text=True, check=False)
+    assert result.returncode == 1
+    assert "fail      7.1/1: top speed" in result.stdout
+    assert ET.parse(out / "junit.xml").getroot()[0].get("failures") == "2"  # noqa: S314 - our own file
+
+
+def test_the_list_shows_clauses_and_needs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert conformance("--list", "--case", "6.2/1") == 0
+    line = capsys.readouterr().out
+    assert line.startswith("6.2/1 ")
+    assert "must" in line
+    assert "[turns 40 deg]  [needs a trigger input that the rig can drive]" in line
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--port", "emulator://"], "give --port URL and --out DIR"),
+        (["--port", "emulator://", "--out", "OUT", "--case", "12"], "--case: no case begins with 12"),
+        (["--port", "/dev/no-such-table", "--out", "OUT"], "cannot open /dev/no-such-table"),
+        (["--port", "loop://", "--out", "OUT", "--yes"], "this is no table of this protocol"),
+        (["--port", "loop://", "--out", "OUT"], "deg/s2; say --yes if it may"),
+        (["--port", "emulator://", "--out", "OUT", "--profile", "none.toml"], "none.toml: cannot be read"),
+        (["--port", "emulator://", "--out", "OUT", "--control", "none"], "none: "),
+        (["--port", "emulator://", "--replay", "none.json"], "none.json: cannot be read"),
+        (["--nonsense"], "unrecognized arguments: --nonsense"),
+    ],
+)
+def test_what_cannot_be_done_is_one_clear_line(
+    words: list[str], sentence: str, out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert conformance(*(str(out) if word == "OUT" else word for word in words)) == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count("\n") == 1
+
+
+# Replay
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Path:
+    conformance("--port", "emulator://", "--case", "4.5", "--case", "5.2", "--case", "6.2", "--out", tmp_path / "recorded")
+    return tmp_path / "recorded" / "record.json"
+
+
+def test_a_record_sent_to_a_like_table_gets_the_same_answers(record: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert conformance("--port", "emulator://?seed=9", "--replay", record) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1].startswith("0 of ")
+    assert {line.split()[0] for line in lines[:-1]} == {"same"}
+
+
+def test_a_record_sent_to_another_table_shows_where_the_answers_part(
+    record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "recorded" / "record.json"
+    changed = json.loads(file.read_text())
+    case = next(case for case in changed["cases"] if case["id"] == "4.5/4")
+    index = next(i for i, (_, way, data) in enumerate(case["wire"]) if (way, data) == ("received", "OK\r"))
+    case["wire"][index][2] = "ERR 3 out of range\r"
+    file.write_text(json.dumps(changed))
+    capsys.readouterr()
+    assert conformance("--port", "emulator://", "--replay", record, "--case", "4.5/4") == 1
+    assert "parts     4.5/4: at 0.0" in (printed := capsys.readouterr().out)
+    assert "recorded b'ERR 3 out of range', now b'OK'" in printed
+    assert printed.endswith("1 of 1 cases part\n")
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"version": 2}, "is of version 2; this program reads version 1"),
+        ({"format": "a shopping list"}, "is no seventh-axis conformance record"),
+        ({"cases": [{}]}, "is damaged: KeyError 'id'"),
+        ({"home_deg": 90}, "the record began at 90; bring it there first"),
+    ],
+)
+def test_a_record_that_cannot_be_sent_is_refused_in_one_line(
+    change: dict[str, object], sentence: str, record: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record.write_text(json.dumps(json.loads(record.read_text()) | change))
+    capsys.readouterr()
+    assert conformance("--port", "emulator://", "--replay", record) == 2
+    assert sentence in capsys.readouterr().err
+
+
+def test_a_record_of_a_livelier_table_is_not_sent(
+    record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    profile = tmp_path / "careful.toml"
+    profile.write_text("[motion]\nspeed_deg_s = 5\n")
+    assert conformance("--port", "emulator://", "--profile", profile, "--replay", record) == 2
+    assert "was recorded with motion.speed_deg_s 40; the profile allows 5" in capsys.readouterr().err
