@@ -1,7 +1,6 @@
 """A plan on disk: one JSON file with everything needed to run it. The same plan gives the same bytes."""
 
 import json
-import os
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from planner.plan import Pause, Plan
 from planner.problem import Problem
 from planner.scan import Scan
 from planner.verification import verify
+from planner.whole_file import whole_file
 
 _FORMAT = "seventh-axis plan"
 _FORMAT_VERSION = 1
@@ -68,12 +68,8 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -
 
 def save_plan(file: Path, document: dict[str, Any]) -> None:
     """Write a plan to `file`, which appears when it is whole."""
-    partial = file.with_name(f".{file.name}.{os.getpid()}.partial")
-    try:
+    with whole_file(file) as partial:
         partial.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        partial.replace(file)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def load_plan(file: Path) -> Plan:

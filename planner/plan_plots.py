@@ -1,6 +1,5 @@
 """A plan's picture: the map with the path, the speed and the acceleration (Fig. 7 and 9)."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ from matplotlib.figure import Figure
 from planner.arrays import FloatArray
 from planner.plan import Plan
 from planner.problem import Problem
+from planner.whole_file import whole_file
 
 PLAN_COLOUR, CURVE_COLOUR, PAUSE_COLOUR = "#d62728", "#1f77b4", "#e7a33e"
 _DPI = 120
@@ -30,12 +30,8 @@ def plan_figure(problem: Problem, plan: Plan, title: str) -> Figure:
 
 def plot_plan(problem: Problem, plan: Plan, title: str, file: Path) -> None:
     """Write the picture of a plan to `file`, which appears when it is whole."""
-    partial = file.with_name(f".{file.name}.{os.getpid()}.partial")
-    try:
+    with whole_file(file) as partial:
         plan_figure(problem, plan, title).savefig(partial, format="png", metadata={"Software": None})
-        partial.replace(file)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def draw_wrapped(axes: Axes, angles_deg: FloatArray) -> None:

@@ -16,8 +16,10 @@ from planner.arm import Arm
 from planner.arrays import FloatArray
 from planner.bodies import Bodies, load_bodies
 from planner.cell import Cell, Probe, Table, placement
+from planner.cost import Weights, default_weights
 from planner.errors import PlannerError, ScanFileError, WorkpieceError
 from planner.mesh import load_mesh, radius_about_axis_mm, size_fault
+from planner.motion import Limits
 from planner.patterns import PATTERNS, Coverage
 from planner.scan_path import ScanPath, at_scan_speed, load_scan_path
 from planner.toml_table import TomlTable
@@ -27,27 +29,6 @@ from planner.workpiece import CLASSES, Workpiece
 _SHIPPED = Path(__file__).parent / "scans"
 # A workpiece may touch the table, and a mesh's base need not be ground flat.
 _BASE_TOLERANCE_MM = 0.5
-
-
-@dataclass(frozen=True)
-class TableLimits:
-    """What the table's controller allows; the defaults are those of the stand-in."""
-
-    speed_deg_s: float = 40.0
-    acceleration_deg_s2: float = 100.0
-
-
-@dataclass(frozen=True)
-class CostWeights:
-    """Weights of the table's motion in Eq. (5).
-
-    Attributes:
-        k_a: Weight of the squared acceleration, (deg/s2)^-2.
-        k_w: Weight of the squared speed, (deg/s)^-2.
-    """
-
-    k_a: float
-    k_w: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +56,8 @@ class Scan:
     mesh_file: Path | None
     path: ScanPath = field(repr=False)
     value: ValueFunction
-    limits: TableLimits
-    weights: CostWeights
+    limits: Limits
+    weights: Weights
 
 
 def shipped_scans() -> list[str]:
@@ -227,19 +208,21 @@ def _read_coverage(section: TomlTable) -> Coverage:
     )
 
 
-def _read_limits(section: TomlTable) -> TableLimits:
-    limits = TableLimits(
-        speed_deg_s=section.number("table_speed_deg_s", TableLimits.speed_deg_s, above=0.0),
-        acceleration_deg_s2=section.number("table_acceleration_deg_s2", TableLimits.acceleration_deg_s2, above=0.0),
+def _read_limits(section: TomlTable) -> Limits:
+    default = Limits()
+    limits = Limits(
+        speed_deg_s=section.number("table_speed_deg_s", default.speed_deg_s, above=0.0),
+        acceleration_deg_s2=section.number("table_acceleration_deg_s2", default.acceleration_deg_s2, above=0.0),
     )
     section.finish()
     return limits
 
 
-def _read_weights(section: TomlTable, limits: TableLimits) -> CostWeights:
-    weights = CostWeights(
-        k_a=section.number("k_a", 0.1 / limits.acceleration_deg_s2**2, at_least=0.0),
-        k_w=section.number("k_w", 0.1 / limits.speed_deg_s**2, at_least=0.0),
+def _read_weights(section: TomlTable, limits: Limits) -> Weights:
+    default = default_weights(limits)
+    weights = Weights(
+        acceleration=section.number("k_a", default.acceleration, at_least=0.0),
+        speed=section.number("k_w", default.speed, at_least=0.0),
     )
     section.finish()
     return weights

@@ -30,6 +30,7 @@ from planner.problem import Problem
 from planner.ray_shooting import Rays, cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
 from planner.synthetic_maps import MapFamily, blocks_map, synthetic_map
 from planner.value import joint_factor
+from planner.whole_file import whole_file
 
 RAY_COLOUR = "#7fb2e5"
 
@@ -245,9 +246,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.out.mkdir(parents=True, exist_ok=True)
         for name in options.names or FIGURES:
             path = options.out / f"{name}.png"
-            partial = options.out / f".{name}.partial.png"
-            FIGURES[name]().savefig(partial, dpi=150, metadata={"Software": None})
-            partial.replace(path)
+            with whole_file(path) as partial:
+                FIGURES[name]().savefig(partial, dpi=150, metadata={"Software": None})
             print(path)
     except OSError as error:
         print(f"cannot write the figures to {options.out}: {error.strerror}", file=sys.stderr)

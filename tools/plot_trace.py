@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from emulator.trace import Trace, read_trace
+from planner.whole_file import whole_file
 from protocol import LineBuffer
 
 _EXAMPLE = """example:
@@ -132,12 +133,8 @@ def _mark_commands(labelled: Axes, others: tuple[Axes, ...], commands: list[tupl
 
 def save_figure(figure: Figure, path: Path) -> None:
     """Write the picture under a temporary name first, so that no half of it is ever at `path`."""
-    partial = path.with_name(f"{path.stem}.part{path.suffix}")
-    try:
+    with whole_file(path) as partial:
         figure.savefig(partial, dpi=150)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 if __name__ == "__main__":

@@ -13,12 +13,10 @@ from planner.best_configuration import best_configuration
 from planner.commands.map import angle_count
 from planner.config_map import ConfigurationMap
 from planner.configuration import Configuration
-from planner.cost import Weights
 from planner.errors import PlannerError
 from planner.joint_path import JointPath
 from planner.map_builder import build_maps
 from planner.map_problem import map_problem
-from planner.motion import Limits
 from planner.plan import NoPlan, Outcome, Plan
 from planner.plan_file import plan_document, save_plan
 from planner.plan_plots import plot_plan
@@ -27,6 +25,7 @@ from planner.problem import Problem
 from planner.progress import progress_line
 from planner.reasons import Reason
 from planner.scan import Scan, load_scan, shipped_scans
+from planner.smoothing import smooth
 from planner.verification import verify
 
 _NO_PLAN = 1
@@ -51,6 +50,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument(
         "--angles", type=angle_count, default=360, metavar="COUNT", help="table angles over one turn (default 360)"
     )
+    parser.add_argument("--smooth", action="store_true", help="lower the plan's acceleration peaks afterwards")
     parser.add_argument("--compare", action="store_true", help="run all planners and print a table of them")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for plan.json and plan.png")
     parser.set_defaults(run=run)
@@ -74,7 +74,8 @@ def run(arguments: argparse.Namespace) -> int:
     problem = map_problem(scan, progress_line("distance field", sys.stderr))
     maps = build_maps(problem, asked, arguments.angles, progress_line("map", sys.stderr))
     problems = {configuration.label: problem_of(scan, each, arguments.start) for configuration, each in maps.items()}
-    comparison = best_configuration(problems, timed(PLANNERS[arguments.planner]))
+    planner = PLANNERS[arguments.planner]
+    comparison = best_configuration(problems, timed(smoothed(planner) if arguments.smooth else planner))
     for label, outcome in comparison.outcomes.items():
         sys.stderr.write(configuration_line(label, outcome))
     if comparison.best is None:
@@ -96,10 +97,20 @@ def problem_of(scan: Scan, configuration_map: ConfigurationMap, start_angle_deg:
     return Problem(
         configuration_map,
         scan.path.step_s,
-        Limits(scan.limits.speed_deg_s, scan.limits.acceleration_deg_s2),
-        Weights(scan.weights.k_a, scan.weights.k_w),
+        scan.limits,
+        scan.weights,
         start_angle_deg,
     )
+
+
+def smoothed(planner: Planner) -> Planner:
+    """Return the planner followed by smoothing."""
+
+    def plan(problem: Problem) -> Outcome:
+        outcome = planner(problem)
+        return smooth(problem, outcome) if isinstance(outcome, Plan) else outcome
+
+    return plan
 
 
 def timed(planner: Planner) -> Planner:

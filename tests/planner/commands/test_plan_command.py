@@ -44,6 +44,16 @@ def test_compare_has_a_line_for_each_planner_and_keeps_the_start(
     assert load_plan(tmp_path / "plan.json").angles_deg[0] == 10.0
 
 
+def test_smoothing_lowers_the_peaks_and_never_raises_the_cost(tmp_path: Path) -> None:
+    rays = [*SMALL, "--planner", "ray_shooting"]
+    assert main(["plan", "mould", *rays, "--out", str(tmp_path / "rough")]) == 0
+    assert main(["plan", "mould", *rays, "--smooth", "--out", str(tmp_path / "smooth")]) == 0
+    rough, smooth = (load_plan(tmp_path / name / "plan.json") for name in ("rough", "smooth"))
+    assert smooth.planner == "ray_shooting+smoothing"
+    assert np.abs(smooth.accelerations_deg_s2).max() < np.abs(rough.accelerations_deg_s2).max()
+    assert smooth.cost.total <= rough.cost.total
+
+
 def test_the_same_scan_gives_the_same_bytes(tmp_path: Path) -> None:
     for name in ("a", "b"):
         assert main(["plan", "mould", *SMALL, "--planner", "ray_shooting", "--out", str(tmp_path / name)]) == 0
