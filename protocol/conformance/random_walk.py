@@ -146,6 +146,7 @@ class RandomWalk(RuleBasedStateMachine):
     @_step
     def _go_home(self) -> None:
         self.rig.go_home()
+        self.rig.stand_at_home()
 
     @rule(value=_tenths(2, 20))
     @_step

@@ -36,11 +36,16 @@ def replay(case: RecordedCase, wire: Wire, stand: Stand, profile: Profile) -> Pa
     if not case.wire:
         return None
     origin_s, begin_s = case.wire[0].time_s, wire.clock.now_s()
-    heard = bytearray()
+    heard, due = bytearray(), 0
     for event in case.wire:
-        if event.direction != "received":
-            heard += wire.listen(event.time_s - origin_s - (wire.clock.now_s() - begin_s))
-            _do(event, wire, stand)
+        if event.direction == "received":
+            due += len(event.data)
+            continue
+        heard += wire.listen(event.time_s - origin_s - (wire.clock.now_s() - begin_s))
+        if len(heard) < due:
+            # What had come by now then is allowed the latency; a switched-off table would lose it.
+            heard += wire.listen(profile.serial.latency_s)
+        _do(event, wire, stand)
     heard += wire.listen(case.wire[-1].time_s - origin_s - (wire.clock.now_s() - begin_s) + _AFTER_S)
     tolerance = profile.tolerance.tracking_deg + profile.resolution_deg
     tolerance += profile.serial.latency_s * profile.motion.speed_deg_s

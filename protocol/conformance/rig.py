@@ -156,13 +156,15 @@ class Rig:
         self.expect(b"A %s" % number(rate_deg_s2))
         self.rate_deg_s2 = rate_deg_s2
 
+    def full_settings(self) -> None:
+        """Set S and A to the most that the profile allows."""
+        self.settings(self.profile.motion.speed_deg_s, self.profile.motion.acceleration_deg_s2)
+
     def go_home(self) -> None:
-        """Bring the table to rest where the session began: from there on its reference is known."""
-        motion = self.profile.motion
-        self.settings(motion.speed_deg_s, motion.acceleration_deg_s2)
+        """Bring the table to rest where the session began: there its reference is known."""
+        self.full_settings()
         self.expect(b"P %d" % self.home_deg)
         self.wait_for_rest()
-        self.stand_at_home()
 
     def stand_at_home(self) -> None:
         """Take it that the table rests at home; what was seen of its motion before is forgotten."""

@@ -55,6 +55,7 @@ class Session:
         self._seed = seed
         self.capabilities = capabilities(stand, profile)
         self.home_deg = round(self._first_position())
+        self._is_home = False
 
     def run(self, cases: Iterable[Case], report: Callable[[Outcome], None] = lambda _: None) -> list[Outcome]:
         """Run cases one after the other; the table is stopped whatever ends the run, Ctrl-C too."""
@@ -75,6 +76,7 @@ class Session:
         first_event, begin_s = len(self._port.events), self._port.clock.now_s()
         rig = Rig(self._wire, self._profile, self._stand, self.home_deg, Random(f"{self._seed} {case.id}"))  # noqa: S311  # no secret
         verdict, reason = self._judged(case, rig)
+        self._is_home = self._is_home and verdict is not Verdict.ERROR
         seconds = self._port.clock.now_s() - begin_s
         motion = rig.motion if rig.motion.samples else None
         events = tuple(self._port.events[first_event:])
@@ -82,19 +84,28 @@ class Session:
 
     def stop(self) -> None:
         """Stop the table, and bring it back to where the session began, if it still answers."""
+        self._is_home = False
         try:
-            self._recover()
-            rig = Rig(self._wire, self._profile, self._stand, self.home_deg, Random(0))  # noqa: S311  # not used
-            rig.wait_for_rest()
-            rig.go_home()
+            self._wire.send(_CANCEL + b"R 0\r")
+            self._wire.listen(_SETTLE_S)
+            self._go_home()
         except (NonconformityError, OSError):
             return
+
+    def _go_home(self) -> None:
+        rig = Rig(self._wire, self._profile, self._stand, self.home_deg, Random(0))  # noqa: S311  # not used
+        rig.wait_for_rest()
+        rig.go_home()
+        self._is_home = True
 
     def _judged(self, case: Case, rig: Rig) -> tuple[Verdict, str]:
         """Return verdict and reason of a case, with the table stopped and its line empty where it failed."""
         try:
-            if case.travel_deg or POWER_CYCLE in case.needs:
-                rig.go_home()
+            if case.travel_deg:
+                if not self._is_home:
+                    self._go_home()
+                rig.full_settings()
+                rig.stand_at_home()
             case.run(rig)
             rig.silence("after its last reply the table")
             self._restore(case, rig)
@@ -125,29 +136,24 @@ class Session:
         return ""
 
     def _restore(self, case: Case, rig: Rig) -> None:
-        """Leave the counter at 0 where the case moved the zero: after a preset the table stands where it stood."""
+        """Leave the table at home for the next case; where a case moved the counter's zero, home is 0."""
+        if POWER_CYCLE in case.needs:
+            self.home_deg = 0
         if PRESET in case.needs:
-            self._stand.power_cycle()
+            self._stand.power_cycle()  # the table stands where it stood
             self.home_deg = 0
-        elif POWER_CYCLE in case.needs:
+        elif case.travel_deg:
             rig.go_home()
-            self.home_deg = 0
 
     def _after_failure(self, case: Case) -> None:
-        try:
-            self._recover()
-            rig = Rig(self._wire, self._profile, self._stand, self.home_deg, Random(0))  # noqa: S311  # not used
-            rig.wait_for_rest()
-            if {PRESET, POWER_CYCLE} & case.needs:
+        """Stop the table and empty the line, whatever is on it, and bring it home."""
+        if {PRESET, POWER_CYCLE} & case.needs:
+            try:
                 self._stand.power_cycle()
-                self.home_deg = 0
-        except (NonconformityError, OSError, StandError):
-            return
-
-    def _recover(self) -> None:
-        """Stop the table and empty the line, whatever is on it."""
-        self._wire.send(_CANCEL + b"R 0\r")
-        self._wire.listen(_SETTLE_S)
+            except StandError:
+                return
+            self.home_deg = 0
+        self.stop()
 
     def _first_position(self) -> Decimal:
         """Return where the table rests, or say why it cannot be tested."""
