@@ -15,7 +15,7 @@ from planner.inside_view import view_of
 from planner.map_builder import build_maps
 from planner.map_problem import map_problem
 from planner.motion import Limits
-from planner.plan import NoPlan
+from planner.plan import Plan
 from planner.problem import Problem
 from planner.run_input import RunInput
 from planner.run_verification import RunVerification, verify_run
@@ -60,7 +60,9 @@ def shipped_run_input(name: str) -> RunInput:
     configuration_map = build_maps(map_problem(scan), [configuration], 360)[configuration]
     limits = Limits(scan.limits.speed_deg_s, scan.limits.acceleration_deg_s2)
     problem = Problem(configuration_map, scan.path.step_s, limits)
-    return _run_input(name, problem, problem)
+    run_input = _run_input(name, problem, problem)
+    assert run_input is not None, f"the shipped scan {name} can be planned"
+    return run_input
 
 
 def random_run_inputs(count: int, margin: int = 1, step_s: float = 0.1) -> Iterator[RunInput]:
@@ -77,11 +79,11 @@ def random_run_inputs(count: int, margin: int = 1, step_s: float = 0.1) -> Itera
                            obstacle_size=8.0)  # fmt: skip
         configuration_map = synthetic_map(family, seed)
         problem = Problem(configuration_map, step_s)
-        try:
-            yield _run_input(f"random map {seed}", Problem(widened(configuration_map, margin), step_s), problem)
+        asked = Problem(widened(configuration_map, margin), step_s)
+        run_input = _run_input(f"random map {seed}", asked, problem)
+        if run_input is not None:
+            yield run_input
             count -= 1
-        except LookupError:
-            pass
         seed += 1
 
 
@@ -93,9 +95,7 @@ def widened(configuration_map: ConfigurationMap, samples: int) -> ConfigurationM
     return ConfigurationMap(np.where(allowed, configuration_map.values, 0.0))
 
 
-def _run_input(name: str, asked: Problem, problem: Problem) -> RunInput:
-    """Return the plan of the problem `asked`, to be judged by `problem`; LookupError where there is none."""
+def _run_input(name: str, asked: Problem, problem: Problem) -> RunInput | None:
+    """Return the plan of the problem `asked`, to be judged by `problem`; None where there is no plan."""
     plan = dynamic_programming(asked)
-    if isinstance(plan, NoPlan):
-        raise LookupError(plan.reason)
-    return RunInput(name, plan, problem, np.zeros((len(plan.angles_deg), 6)), {})
+    return RunInput(name, plan, problem, np.zeros((len(plan.angles_deg), 6)), {}) if isinstance(plan, Plan) else None

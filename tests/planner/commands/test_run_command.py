@@ -1,0 +1,133 @@
+"""`run` and `show` from the command line: in virtual time, on a real pty and over TCP, and with bad input."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from planner.__main__ import main
+from tests.planner.run_examples import LOCATIONS, write_short_scan
+
+
+@pytest.fixture
+def plan_file(tmp_path: Path) -> Path:
+    return write_short_scan(tmp_path)
+
+
+def run(plan_file: Path, out: Path, port: str = "emulator://", *options: str) -> int:
+    return main(["run", str(plan_file), "--port", port, "--out", str(out), *options])
+
+
+def result_in(out: Path) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    return document
+
+
+def test_a_run_is_verified_and_leaves_its_files(
+    plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert run(plan_file, out) == 0
+    assert capsys.readouterr().out.startswith("verified: within 0.")
+    names = {file.name for file in out.iterdir()}
+    assert names == {"run.json", "run.csv", "run.png", "plan.json", "map.npz", "robot.csv", "robot.json"}
+    assert result_in(out)["verified"]
+    assert len(json.loads((out / "robot.json").read_text())["latched"]) == LOCATIONS
+
+
+def test_the_same_run_gives_the_same_bytes(plan_file: Path, tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        assert run(plan_file, tmp_path / name) == 0
+    for name in ("run.json", "run.csv", "run.png", "robot.csv", "robot.json"):
+        assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()
+
+
+def test_a_tolerance_that_is_not_kept_is_a_negative_verdict(
+    plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(plan_file, tmp_path / "run", "emulator://", "--tolerance", "0.001") == 1
+    assert capsys.readouterr().out.startswith("deviated: ")
+
+
+def test_show_writes_one_page_with_everything_in_it(plan_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    run(plan_file, out)
+    assert main(["show", str(out)]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert result_in(out)["verdict"] in page
+    assert page.count("<svg") == 3
+    assert "http://" not in page.replace("http://www.w3.org", "").replace("http://creativecommons.org", "").replace(
+        "http://purl.org", ""
+    )
+    sent = result_in(out)["commands"][3]["command"]
+    assert f"<td>{sent['target_deg']:g}</td>" in page
+
+
+@pytest.mark.parametrize(
+    ("port", "sentence"),
+    [
+        ("/dev/no-such-device", "cannot open /dev/no-such-device"),
+        ("loop://", "check power, cable and baud rate"),
+    ],
+)
+def test_a_port_without_a_table_is_one_sentence(
+    plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], port: str, sentence: str
+) -> None:
+    assert run(plan_file, tmp_path / "run", port, "--timeout", "0.05") == 2
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert error.count("\n") == 1
+
+
+def test_a_silent_port_is_one_sentence(plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with subprocess.Popen([sys.executable, "-c", SILENT_SERVER], stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        port = f"socket://127.0.0.1:{server.stdout.readline().strip()}"
+        assert run(plan_file, tmp_path / "run", port, "--timeout", "0.1") == 2
+        server.terminate()
+    assert "no reply" in capsys.readouterr().err
+
+
+SILENT_SERVER = """
+import socket, time
+listener = socket.create_server(("127.0.0.1", 0))
+print(listener.getsockname()[1], flush=True)
+connection, _ = listener.accept()
+time.sleep(20)
+"""
+
+
+def test_a_plan_for_a_faster_table_is_refused(
+    plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = json.loads(plan_file.read_text())
+    document["limits"]["speed_deg_s"] = 60.0
+    plan_file.write_text(json.dumps(document))
+    assert run(plan_file, tmp_path / "run") == 2
+    assert "plan within this table's own limits" in capsys.readouterr().err
+
+
+def test_a_folder_without_a_run_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", str(tmp_path)]) == 2
+    assert "python -m planner run writes one" in capsys.readouterr().err
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("where", ["--pty", "--tcp"])
+def test_a_real_port_gets_the_same_commands_and_the_same_verdict(plan_file: Path, tmp_path: Path, where: str) -> None:
+    control = tmp_path / "control"
+    listen = [where] if where == "--pty" else [where, "0"]
+    command = [sys.executable, "-m", "emulator", *listen, "--control", str(control)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as stand_in:
+        assert stand_in.stdout is not None
+        port = stand_in.stdout.readline().strip()
+        assert run(plan_file, tmp_path / "real", port, "--control", str(control), "--tolerance", "0.5") == 0
+        stand_in.terminate()
+    assert run(plan_file, tmp_path / "virtual") == 0
+    real, virtual = (result_in(tmp_path / name) for name in ("real", "virtual"))
+    assert [each["command"] for each in real["commands"]] == [each["command"] for each in virtual["commands"]]
+    assert real["verified"]
+    assert not real["missing_triggers"]

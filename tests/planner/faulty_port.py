@@ -1,0 +1,59 @@
+"""A port onto a simulated table that goes wrong at a chosen moment."""
+
+from collections.abc import Callable
+from typing import Any
+
+from planner.table_port import open_port
+from protocol import Clock
+
+Fault = Callable[[bytes], bytes]
+
+
+def hang_up(_: bytes) -> bytes:
+    """The line is dead."""
+    raise OSError(5, "Input/output error")
+
+
+def lose(_: bytes) -> bytes:
+    """What came is lost."""
+    return b""
+
+
+class FaultyPort:
+    """The port of a table in virtual time; each read from `fault_s` on goes through `fault`.
+
+    Attributes:
+        table: the simulated table.
+        clock: its time, or what a test puts in its place.
+    """
+
+    def __init__(self, fault: Fault | None = None, fault_s: float = 0.0, faults: int = 1_000_000) -> None:
+        self._port: Any = open_port("emulator://", 9600, 0.5)
+        self._fault, self._fault_s, self._faults = fault, fault_s, faults
+        self.table: Any = self._port.table
+        self.clock: Clock = self._port.clock
+
+    @property
+    def timeout(self) -> float | None:
+        return float(self._port.timeout)
+
+    @timeout.setter
+    def timeout(self, timeout_s: float | None) -> None:
+        self._port.timeout = timeout_s
+
+    @property
+    def in_waiting(self) -> int:
+        return int(self._port.in_waiting)
+
+    def read(self, size: int, /) -> bytes:
+        data = bytes(self._port.read(size))
+        if self._fault is None or not data or self.clock.now_s() < self._fault_s or not self._faults:
+            return data
+        self._faults -= 1
+        return self._fault(data)
+
+    def write(self, data: bytes, /) -> int:
+        return int(self._port.write(data))
+
+    def close(self) -> None:
+        self._port.close()
