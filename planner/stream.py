@@ -27,11 +27,11 @@ _STANDING_DEG_S = 1e-6
 LATEST_S = 0.1
 
 # What a deg of error at the end of a step is weighed against: half as much in its middle; the way that an error of the
-# end's speed makes in a third of a step; and a little, so that of equals the one is taken which stops soonest when
-# the line dies.
+# end's speed makes in a third of a step; and, in the smallest number a degree, the way that the table runs on when the
+# line dies, so that of equals the one is taken which stops soonest.
 _MIDDLE_WEIGHT = 0.5
 _SPEED_WEIGHT = 0.3
-_RUN_ON_WEIGHT = 1e-5
+_RUN_ON_WEIGHT = 1e-4
 _SHORT_RUN_ON_DEG = 90.0
 
 
@@ -233,7 +233,7 @@ def _closest(state: ReferenceState, leg: Leg, grid: _Grid) -> MotionCommand:
     for speed, rate in _candidates(state, end, leg.duration_s, grid):
         there = _ramp(state, speed, rate, leg.duration_s)
         error = _error(_ramp(state, speed, rate, 0.5 * leg.duration_s), there, middle, end, leg.duration_s)
-        error += (_RUN_ON_WEIGHT * 0.5 * there.speed_deg_s**2 / rate) ** 2
+        error += (_RUN_ON_WEIGHT * grid.quantum * 0.5 * there.speed_deg_s**2 / rate) ** 2
         if error < least:
             chosen, least = (speed, rate), error
     assert chosen is not None
