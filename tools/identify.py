@@ -43,7 +43,7 @@ def _record(options: argparse.Namespace) -> int:
         raise RecordingError("--speed and --acceleration must be greater than 0")
     turns = excitation(options.duration, options.speed, options.acceleration, options.seed)
     with TableClient.open(options.port, baud=options.baud) as client, Progress("recording") as progress:
-        recording = record(client, turns, options.baud, progress.show)
+        recording = record(client, turns, options.speed, options.baud, progress.show)
     write_recording(options.out, recording)
     print(f"{options.out}: {len(recording.time_s)} readings, {len(recording.commands)} commands")
     return 0

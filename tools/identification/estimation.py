@@ -16,6 +16,7 @@ from tools.identification.likelihood import Intervals
 Foretell = Callable[[Array], Array]
 """Returns the angles (deg) that the readings should tell, for a vector of constants."""
 
+_COARSE_SCALES_DEG = (2e-2, 8e-3)
 _SCALES_DEG = (3e-3, 1e-3, 3e-4)
 _DRAWS = 40
 
@@ -74,7 +75,10 @@ def estimate(
     rounds = len(starts) + len(_SCALES_DEG)
     climbed = []
     for index, start in enumerate(starts):
-        climbed.append(_climb(posterior, start, _SCALES_DEG[0], stride=3.0, rounds=6))
+        peak = _climb(posterior, start, _COARSE_SCALES_DEG[0], stride=4.0, rounds=4)
+        for least_deg in (_COARSE_SCALES_DEG[1], _SCALES_DEG[0]):
+            peak = _climb(posterior, peak.vector, least_deg, stride=4.0, rounds=4)
+        climbed.append(peak)
         progress((index + 1) / rounds)
     best = max(climbed, key=lambda peak: peak.log_posterior)
     for index, least_deg in enumerate(_SCALES_DEG):

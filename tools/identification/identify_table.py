@@ -1,6 +1,7 @@
 """From a recording to a table's constants with their confidence intervals."""
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from math import exp, log
 from typing import NamedTuple
 
@@ -20,7 +21,7 @@ from tools.identification.simulation import (
 )
 from tools.tuning.linear_model import Teeth, load_ratio, speed_gain_deg_s, time_constant_s
 
-_BACKLASH_STARTS_ARCMIN = (4.0, 12.0, 36.0)
+_BACKLASH_STARTS_ARCMIN = (3.0, 8.0, 18.0, 32.0, 55.0)
 _SURE_95 = 1.96
 _TOLD_SHARE = 0.5
 """A constant is told by a recording that at least halves what was uncertain of it."""
@@ -29,7 +30,11 @@ _WIRE_DELAY_S = 1e-4
 """How well the times of commands and readings agree: the line delays both alike."""
 
 _START_DEG = 0.02
-"""How far from the reference the encoder may stand at the start."""
+"""How far from the reference the encoder may stand, without a duty that tells it."""
+
+_DRIFT_KNOT_S = 6.0
+"""The encoder's place behind the reference drifts: at each change of the gain set the regulator keeps its output, and
+so forgets a little of how far it is behind. This long, straight pieces of the drift are told from the readings."""
 
 _DRIVE_WINDOW_S = 0.008
 
@@ -132,14 +137,27 @@ def _wire_problem(config: TableConfig, recording: WireRecording) -> tuple[Array,
     low = np.ceil((seen_deg - half) * count_deg - 1e-6) / count_deg
     high = (np.floor((seen_deg + half) * count_deg + 1e-6) + 1.0) / count_deg
 
-    def foretell(vector: Array) -> Array:
-        *logarithms, delay_s, start_deg = vector
-        turned = wire_positions_deg(with_logarithms(config, logarithms), recording, motions, delay_s)
-        return turned + float(start_deg)
+    drift = _drift(recording.time_s)
+    size = len(PARAMETERS)
 
-    prior = _prior(config, [0.0, 0.0], [_WIRE_DELAY_S, _START_DEG])
-    steps = np.array([*(parameter.step for parameter in PARAMETERS), 2e-4, 1e-3])
+    @lru_cache(maxsize=4)
+    def turned_deg(constants: tuple[float, ...]) -> Array:
+        *logarithms, delay_s = constants
+        return wire_positions_deg(with_logarithms(config, logarithms), recording, motions, delay_s)
+
+    def foretell(vector: Array) -> Array:
+        return turned_deg(tuple(vector[: size + 1])) + drift @ vector[size + 1 :]
+
+    knots = drift.shape[1]
+    prior = _prior(config, [0.0] * (1 + knots), [_WIRE_DELAY_S, *[_START_DEG] * knots])
+    steps = np.array([*(parameter.step for parameter in PARAMETERS), 2e-4, *[1e-3] * knots])
     return recording.time_s, seen_deg, Posterior(Intervals(low, high), foretell, prior, steps)
+
+
+def _drift(time_s: Array) -> Array:
+    """Return the hat functions (readings, knots) of a piecewise straight line."""
+    knots = np.linspace(time_s[0], time_s[-1], max(2, 1 + round((time_s[-1] - time_s[0]) / _DRIFT_KNOT_S)))
+    return np.array([np.interp(time_s, knots, hat) for hat in np.eye(len(knots))]).T
 
 
 def _drive_problem(config: TableConfig, recording: DriveRecording) -> tuple[Array, Array, Posterior]:

@@ -14,13 +14,18 @@ _BITS_A_BYTE = 10
 
 
 def record(
-    client: TableClient, turns: list[Turn], baud: int, progress: Callable[[float], None] = lambda _: None
+    client: TableClient,
+    turns: list[Turn],
+    speed_deg_s: float,
+    baud: int,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> WireRecording:
     """Return what the table answers while it makes the turns; it is brought back to its start afterwards.
 
     Args:
         client: A client that no one else uses, sending one decimal.
         turns: From `excitation`.
+        speed_deg_s: The top speed, which no turn reaches.
         baud: Of the line: a command counts from when it is complete at the table.
         progress: Called with the share that is done.
 
@@ -31,19 +36,18 @@ def record(
     client.move_to(home_deg)
     client.wait_until_at(home_deg)
     recorder = _Recorder(client, baud)
-    reach_deg = 2.0 * max(abs(turn.speed_deg_s) * (turn.duration_s + _spin_up_s(turn)) for turn in turns)
+    reach_deg = 2.0 * max(turn.acceleration_deg_s2 * turn.duration_s**2 for turn in turns)
     length_s = sum(turn.duration_s for turn in turns)
     try:
         end_s = 0.0
         for turn in turns:
             end_s += turn.duration_s
-            recorder.send("S", abs(turn.speed_deg_s))
+            recorder.send("S", speed_deg_s)
             recorder.send("A", turn.acceleration_deg_s2)
-            recorder.send("P", home_deg + (reach_deg if turn.speed_deg_s > 0.0 else -reach_deg))
+            recorder.send("P", home_deg + turn.direction * reach_deg)
             while recorder.now_s() < end_s:
                 recorder.read()
             progress(min(end_s / length_s, 1.0))
-        client.set_speed(round(max(abs(turn.speed_deg_s) for turn in turns), 1))
         client.move_to(home_deg)
     except BaseException:
         with suppress(TableError):
@@ -51,10 +55,6 @@ def record(
         raise
     client.wait_until_at(home_deg)
     return recorder.recording()
-
-
-def _spin_up_s(turn: Turn) -> float:
-    return 2.0 * abs(turn.speed_deg_s) / turn.acceleration_deg_s2
 
 
 class _Recorder:

@@ -54,8 +54,8 @@ def wire_positions_deg(
         delay_s: By how much a reading is older than its time says.
     """
     tick_hz = config.control.tick_hz
-    constants, state = switched_on(config, _SEED)
     ticks = ceil(recording.time_s[-1] * tick_hz) + 2
+    constants, state = switched_on(config, _SEED)
     _, samples = run(constants, state, ticks, motions)
     angle = np.concatenate([[0.0], samples[:, _ANGLE]])
     read = np.ceil(recording.time_s * tick_hz - 1e-3) - delay_s * tick_hz

@@ -1,0 +1,68 @@
+from pathlib import Path
+
+import pytest
+
+from emulator.config import TableConfig, load_config
+from tools.emulated import Motion, emulate
+from tools.identification.identify_table import Constant, Identified, coulomb_Nm, identify
+from tools.identification.recording import DriveRecording, WireRecording
+from tools.tuning.linear_model import Teeth, speed_gain_deg_s, time_constant_s
+
+
+@pytest.fixture(name="found", scope="module")
+def identified(assumed: TableConfig, recording: WireRecording) -> Identified:
+    return identify(assumed, recording)
+
+
+def test_a_minute_over_the_wire_tells_the_constants_of_a_table_that_it_has_not_seen(
+    found: Identified, unseen: Path
+) -> None:
+    truth = load_config(unseen)
+
+    assert speed_gain_deg_s(found.config) == pytest.approx(speed_gain_deg_s(truth), rel=0.05)
+    assert time_constant_s(found.config, Teeth.DRIVING) == pytest.approx(
+        time_constant_s(truth, Teeth.DRIVING), rel=0.05
+    )
+    assert coulomb_Nm(found.config) == pytest.approx(coulomb_Nm(truth), rel=0.15)
+    assert found.config.gears.backlash_arcmin == pytest.approx(truth.gears.backlash_arcmin, rel=0.2)
+
+
+def test_it_says_what_the_recording_does_not_tell(found: Identified) -> None:
+    told = {constant.name: constant.told for constant in found.constants}
+
+    assert told["gain"]
+    assert told["backlash"]
+    assert not told["delay"]  # the line delays commands and readings alike
+
+
+def drive_recording(truth: TableConfig, reversals: int) -> DriveRecording:
+    """Duty and encoder of a table that turns to and fro, fast and slowly."""
+    speeds = (40.0, 2.0, 20.0, 5.0)
+    motions = [
+        Motion(0.1 + 0.6 * turn, 1000.0 * (-1.0) ** turn, speeds[turn // 4 % len(speeds)], 100.0)
+        for turn in range(reversals)
+    ]
+    answer = emulate(truth, motions, 0.1 + 0.6 * reversals, seed=5)
+    return DriveRecording(answer.time_s, answer.duty, answer.encoder_deg)
+
+
+def test_a_drives_duty_tells_the_constants_more_sharply(assumed: TableConfig, unseen: Path) -> None:
+    truth = load_config(unseen)
+
+    found = identify(assumed, drive_recording(truth, 32))
+
+    constants: dict[str, Constant] = {constant.name: constant for constant in found.constants}
+    assert constants["gain"].value == pytest.approx(speed_gain_deg_s(truth), rel=0.02)
+    assert constants["time constant"].value == pytest.approx(1e3 * time_constant_s(truth, Teeth.DRIVING), rel=0.03)
+    assert constants["Coulomb friction"].value == pytest.approx(1e3 * coulomb_Nm(truth), rel=0.05)
+    assert constants["backlash"].value == pytest.approx(truth.gears.backlash_arcmin, rel=0.1)
+    assert constants["delay"].value == pytest.approx(1.0, abs=0.25)  # the PWM's buffer
+    assert constants["delay"].told
+
+
+def test_without_reversals_the_backlash_is_not_told(assumed: TableConfig) -> None:
+    answer = emulate(assumed, [Motion(0.1, 1000.0, 20.0, 100.0)], 12.0)
+
+    found = identify(assumed, DriveRecording(answer.time_s, answer.duty, answer.encoder_deg))
+
+    assert not {constant.name: constant.told for constant in found.constants}["backlash"]

@@ -1,0 +1,98 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from emulator.config import TableConfig
+from tools.identification.recording import DriveRecording, RecordingError, WireRecording
+from tools.identification.recording_checks import check_recording
+
+Spoil = Callable[[WireRecording], WireRecording]
+
+
+def too_short(recording: WireRecording) -> WireRecording:
+    return recording._replace(time_s=recording.time_s[:500], position_deg=recording.position_deg[:500])
+
+
+def with_a_gap(recording: WireRecording) -> WireRecording:
+    kept = (recording.time_s < 20.0) | (recording.time_s > 21.0)
+    return recording._replace(time_s=recording.time_s[kept], position_deg=recording.position_deg[kept])
+
+
+def with_the_clock_set_back(recording: WireRecording) -> WireRecording:
+    return recording._replace(time_s=recording.time_s - 0.3 * (recording.time_s > 20.0))
+
+
+def with_the_clock_set_forward(recording: WireRecording) -> WireRecording:
+    late = 0.4 * (recording.time_s > 2.0)
+    return recording._replace(time_s=recording.time_s + late)
+
+
+def in_radians(recording: WireRecording) -> WireRecording:
+    return recording._replace(position_deg=np.radians(recording.position_deg))
+
+
+def in_milliseconds(recording: WireRecording) -> WireRecording:
+    return recording._replace(time_s=1000.0 * recording.time_s)
+
+
+def in_counts(recording: WireRecording) -> WireRecording:
+    return recording._replace(position_deg=512.0 * recording.position_deg)
+
+
+def stalled(recording: WireRecording) -> WireRecording:
+    position = recording.position_deg.copy()
+    held = recording.time_s > 1.0
+    position[held] = position[np.argmax(held)]
+    return recording._replace(position_deg=position)
+
+
+def without_motion(recording: WireRecording) -> WireRecording:
+    return recording._replace(position_deg=0.0 * recording.position_deg)
+
+
+def without_commands(recording: WireRecording) -> WireRecording:
+    return recording._replace(commands=())
+
+
+def test_a_good_recording_passes(assumed: TableConfig, recording: WireRecording) -> None:
+    check_recording(assumed, recording)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "complaint"),
+    [
+        (too_short, r"500 readings in .* s; needed are"),
+        (with_a_gap, r"a gap of 1\.\d\d s at (19\.9|20\.0)"),
+        (with_the_clock_set_back, r"the clock steps back by 0\.2\d* s at (19\.9|20\.0)"),
+        (with_the_clock_set_forward, "not where its commands send it|a step of the clock|stall"),
+        (in_radians, r"moves over [0-9.]+ deg only|not where its commands send it"),
+        (in_milliseconds, "are its times in seconds"),
+        (in_counts, "the wrong units"),
+        (stalled, "a stall"),
+        (without_motion, "moves over 0 deg only"),
+        (without_commands, "no P or R command"),
+    ],
+)
+def test_a_useless_recording_is_refused(
+    spoil: Spoil, complaint: str, assumed: TableConfig, recording: WireRecording
+) -> None:
+    with pytest.raises(RecordingError, match=complaint):
+        check_recording(assumed, spoil(recording))
+
+
+@pytest.mark.parametrize(
+    ("duty_scale", "moves", "complaint"),
+    [(100.0, True, "must be within -1..1"), (0.9, False, "driven hard but stands still")],
+)
+def test_a_drive_that_cannot_be_understood_is_refused(
+    duty_scale: float, moves: bool, complaint: str, assumed: TableConfig
+) -> None:
+    time_s = np.arange(0.0, 12.0, 0.001)
+    duty = duty_scale * np.sign(np.sin(2.0 * np.pi * 0.25 * time_s))
+    position = 20.0 * np.sin(2.0 * np.pi * 0.25 * time_s)
+    if not moves:
+        position[3000:] = position[3000]
+
+    with pytest.raises(RecordingError, match=complaint):
+        check_recording(assumed, DriveRecording(time_s, duty, position))
