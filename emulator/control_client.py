@@ -72,8 +72,8 @@ def _parser() -> argparse.ArgumentParser:
     for name, command in COMMANDS.items():
         subparser = commands.add_parser(name, help=command.help, description=command.help)
         for parameter in command.parameters:
-            name = "--" + parameter.name.replace("_", "-") if parameter.optional else parameter.name
-            subparser.add_argument(name, type=float, help=parameter.help)
+            flag = "--" + parameter.name.replace("_", "-") if parameter.optional else parameter.name
+            subparser.add_argument(flag, type=float, help=parameter.help)
     return parser
 
 

@@ -24,7 +24,9 @@ class FaultKind(NamedTuple):
 
 
 _PROBABILITY = Parameter("probability", 0.0, 1.0, "of each byte")
-_DIRECTION = Parameter("direction", -1, 1, "1: towards the table, -1: towards the client, 0 (default): both", optional=True)
+_DIRECTION = Parameter(
+    "direction", -1, 1, "1: towards the table, -1: towards the client, 0 (default): both", optional=True
+)
 
 KINDS: Mapping[str, FaultKind] = {
     "drop": FaultKind("bytes are lost on the line", (_PROBABILITY, _DIRECTION)),
@@ -40,7 +42,9 @@ KINDS: Mapping[str, FaultKind] = {
     ),
     "silence": FaultKind("the table carries out what it hears and says nothing"),
     "hang-up": FaultKind("the port goes away; it comes back when the fault ends"),
-    "wrong-baud": FaultKind("the table listens and talks at another rate", (Parameter("baud", 50, 4_000_000, "of it"),)),
+    "wrong-baud": FaultKind(
+        "the table listens and talks at another rate", (Parameter("baud", 50, 4_000_000, "of it"),)
+    ),
     "stall": FaultKind("something holds the table"),
     "extra-load": FaultKind(
         "a torque loads the table",
@@ -49,7 +53,8 @@ KINDS: Mapping[str, FaultKind] = {
     "supply-sag": FaultKind("the motor's supply falls", (Parameter("supply_V", 0.0, 100.0, "that is left"),)),
     "stuck-pwm": FaultKind("the bridge keeps one duty", (Parameter("duty", -1.0, 1.0, "that it keeps"),)),
     "one-sided": FaultKind(
-        "the bridge drives in one direction only", (Parameter("direction", -1, 1, "1: forwards, -1: backwards, 0: neither"),)
+        "the bridge drives in one direction only",
+        (Parameter("direction", -1, 1, "1: forwards, -1: backwards, 0: neither"),),
     ),
     "lost-counts": FaultKind("encoder edges are not counted", (_PROBABILITY._replace(help="of each edge"),)),
     "swapped-encoder": FaultKind("the encoder's A and B are swapped: it counts the wrong way"),
@@ -67,7 +72,9 @@ KINDS: Mapping[str, FaultKind] = {
 
 SCHEDULE: tuple[Parameter, ...] = (
     Parameter("at_s", 0.0, 1e9, "begins at this time since the table was switched on (default: now)", optional=True),
-    Parameter("at_command", 1, 1e9, "begins with this command, counted from the first ever (default: now)", optional=True),
+    Parameter(
+        "at_command", 1, 1e9, "begins with this command, counted from the first ever (default: now)", optional=True
+    ),
     Parameter("for_s", 0.001, 1e9, "lasts so long (default: until it is cleared)", optional=True),
 )
 """What every fault takes besides its own numbers."""
@@ -118,7 +125,11 @@ def fault_from(kind: object, given: Mapping[str, object]) -> Fault:
     at_command = numbers.get("at_command")
     return Fault(
         kind,
-        tuple((parameter.name, numbers[parameter.name]) for parameter in KINDS[kind].parameters if parameter.name in numbers),
+        tuple(
+            (parameter.name, numbers[parameter.name])
+            for parameter in KINDS[kind].parameters
+            if parameter.name in numbers
+        ),
         numbers.get("at_s"),
         None if at_command is None else int(at_command),
         numbers.get("for_s"),

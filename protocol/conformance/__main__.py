@@ -45,19 +45,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         cases = _chosen(options.case)
         if options.list:
             return _list(cases)
-        if not options.port or not (options.out or options.replay):
-            raise UsageError("give --port URL and --out DIR, or --list (--help shows all options)")
-        profile = load_profile(options.profile)
-        port = open_port(options.port, profile)
-        try:
-            if options.replay:
-                return _replay(options, profile, port)
-            return _run(options, profile, port, cases)
-        finally:
-            port.close()
+        return _on_the_table(options, cases)
     except (UsageError, ProfileError, RecordError, SessionError, StandError, OSError) as error:
         _say(str(error))
         return 2
+
+
+def _on_the_table(options: argparse.Namespace, cases: Sequence[Case]) -> int:
+    if not options.port or not (options.out or options.replay):
+        raise UsageError("give --port URL and --out DIR, or --list (--help shows all options)")
+    profile = load_profile(options.profile)
+    port = open_port(options.port, profile)
+    try:
+        if options.replay:
+            return _replay(options, profile, port)
+        return _run(options, profile, port, cases)
+    finally:
+        port.close()
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -70,7 +74,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("--port", metavar="URL", help="the table: a device, or any URL of pyserial's")
-    add("--profile", metavar="FILE", type=Path, help="TOML file of what is known of this table (default: the stand-in's)")
+    add(
+        "--profile",
+        metavar="FILE",
+        type=Path,
+        help="TOML file of what is known of this table (default: the stand-in's)",
+    )
     add("--case", metavar="PREFIX", action="append", default=[], help="only cases whose id begins so; may be repeated")
     add("--control", metavar="PATH", type=Path, help="the control channel of a running stand-in")
     add("--out", metavar="DIR", type=Path, help="where record.json, report.html and junit.xml go")
@@ -126,7 +135,9 @@ def _progress(outcomes: list[Outcome], total: int, options: argparse.Namespace) 
     def take(outcome: Outcome) -> None:
         outcomes.append(outcome)
         if sys.stderr.isatty():
-            sys.stderr.write(f"\r\x1b[K{len(outcomes)}/{total} {outcome.case.id}\r" if len(outcomes) < total else "\r\x1b[K")
+            sys.stderr.write(
+                f"\r\x1b[K{len(outcomes)}/{total} {outcome.case.id}\r" if len(outcomes) < total else "\r\x1b[K"
+            )
         if outcome.verdict is Verdict.PASS:
             return
         print(f"{outcome.verdict:9} {outcome.case.id}: {outcome.reason}")

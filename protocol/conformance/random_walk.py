@@ -151,36 +151,43 @@ class RandomWalk(RuleBasedStateMachine):
     @rule(value=_tenths(2, 20))
     @_step
     def set_speed(self, value: float) -> None:
+        """Set S."""
         self.rig.set_speed(min(value, self.rig.profile.motion.speed_deg_s))
 
     @rule(value=_tenths(20, 80))
     @_step
     def set_acceleration(self, value: float) -> None:
+        """Set A."""
         self.rig.set_acceleration(min(value, self.rig.profile.motion.acceleration_deg_s2))
 
     @rule(angle=_tenths(-10, 10))
     @_step
     def move_to(self, angle: float) -> None:
+        """Command P."""
         self.rig.move_to(angle)
 
     @rule(way=_tenths(-3, 3))
     @_step
     def move_by(self, way: float) -> None:
+        """Command R."""
         self.rig.move_by(way)
 
     @rule(seconds=_tenths(0, 0.5))
     @_step
     def wait(self, seconds: float) -> None:
+        """Let time pass."""
         self.rig.wire.clock.sleep_s(seconds)
 
     @rule()
     @_step
     def read_position(self) -> None:
+        """Read the position, which the trapezoid predicts."""
         self._sample()
 
     @rule()
     @_step
     def read_latch(self) -> None:
+        """Read the latch, which keeps what it holds."""
         latched = float(self.rig.read(b"L"))
         if self.latch is None:
             self.latch = latched, latched
@@ -192,6 +199,7 @@ class RandomWalk(RuleBasedStateMachine):
     @rule()
     @_step
     def trigger(self) -> None:
+        """Trigger between two readings: the latch lies between them."""
         before = self._sample()
         self.rig.stand.trigger()
         after = self._sample()
@@ -201,11 +209,13 @@ class RandomWalk(RuleBasedStateMachine):
     @rule(refused=st.sampled_from(_REFUSED))
     @_step
     def be_refused(self, refused: tuple[bytes, ErrorCode]) -> None:
+        """Send a line that changes nothing."""
         self.rig.refused(*refused)
 
     @rule(letters=st.lists(st.sampled_from((b"H", b"L")), min_size=2, max_size=6))
     @_step
     def read_several_at_once(self, letters: list[bytes]) -> None:
+        """Send several readings in one piece."""
         self.rig.wire.send(b"".join(letter + b"\r" for letter in letters))
         for letter in letters:
             self.rig.angle_in(self.rig.reply_to(letter), letter)
@@ -213,12 +223,14 @@ class RandomWalk(RuleBasedStateMachine):
     @rule(half=st.sampled_from((b"R 5", b"P", b"H", b"S 1")))
     @_step
     def cancel(self, half: bytes) -> None:
+        """Leave a half line, and cancel it."""
         self.rig.wire.send(half)
         self.rig.refused(b"\x18", ErrorCode.BAD_BYTE)
 
     @rule()
     @_step
     def come_to_rest(self) -> None:
+        """Wait for the end of the motion, and look where it is."""
         self.rig.follow()
         resting = float(self.rig.wait_for_rest())
         last = self.rig.motion.expectations[-1]

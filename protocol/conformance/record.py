@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as XML
+from xml.etree import ElementTree as ET
 
 from protocol.conformance.profile import Profile, ProfileError, profile_from
 from protocol.conformance.rig import Expectation, MotionRecord, Sample
@@ -117,11 +117,11 @@ def read_record(path: Path) -> Record:
 
 
 def write_junit(path: Path, header: Header, outcomes: Sequence[Outcome]) -> None:
-    """Write the verdicts as JUnit's XML."""
+    """Write the verdicts as JUnit's ET."""
     counts = count_verdicts(outcomes)
     numbers = {"tests": len(outcomes), "failures": counts.get(Verdict.FAIL, 0), "errors": counts.get(Verdict.ERROR, 0)}
     seconds = sum(outcome.seconds for outcome in outcomes)
-    suite = XML.Element(
+    suite = ET.Element(
         "testsuite",
         {"name": f"conformance of {header.device}", "time": f"{seconds:.3f}"}
         | {key: str(value) for key, value in numbers.items()}
@@ -131,18 +131,18 @@ def write_junit(path: Path, header: Header, outcomes: Sequence[Outcome]) -> None
         name = f"{outcome.case.id} {outcome.case.run.__name__}"
         section = outcome.case.clause.number.partition("/")[0]
         attributes = {"classname": f"protocol.conformance.{section}", "name": name, "time": f"{outcome.seconds:.3f}"}
-        element = XML.SubElement(suite, "testcase", attributes)
+        element = ET.SubElement(suite, "testcase", attributes)
         tag = {Verdict.FAIL: "failure", Verdict.ERROR: "error", Verdict.SKIPPED: "skipped"}.get(outcome.verdict)
         if tag:
-            detail = XML.SubElement(element, tag, {"message": _xml_text(outcome.reason)})
+            detail = ET.SubElement(element, tag, {"message": _xml_text(outcome.reason)})
             detail.text = f"{outcome.case.clause.level}: {outcome.case.clause.text}"
         if outcome.measurements:
             lines = (f"{measurement.verdict}: {measurement}" for measurement in outcome.measurements)
-            XML.SubElement(element, "system-out").text = "\n".join(lines)
-    suites = XML.Element("testsuites")
+            ET.SubElement(element, "system-out").text = "\n".join(lines)
+    suites = ET.Element("testsuites")
     suites.append(suite)
-    XML.indent(suites)
-    write_whole(path, '<?xml version="1.0" encoding="utf-8"?>\n' + XML.tostring(suites, encoding="unicode") + "\n")
+    ET.indent(suites)
+    write_whole(path, '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(suites, encoding="unicode") + "\n")
 
 
 def write_whole(path: Path, text: str) -> None:

@@ -8,10 +8,11 @@ from typing import NamedTuple
 from protocol.conformance.profile import Profile
 from protocol.conformance.record import RecordedCase
 from protocol.conformance.stand import Stand
-from protocol.conformance.wire import Event, Wire
+from protocol.conformance.wire import CR, Event, Wire
 
 _ANGLE = re.compile(rb"([HL]) (-?[0-9]+\.[0-9]+)")
 _AFTER_S = 0.3
+_MOMENT_S = 0.001
 
 
 class Parting(NamedTuple):
@@ -39,12 +40,12 @@ def replay(case: RecordedCase, wire: Wire, stand: Stand, profile: Profile) -> Pa
     heard, due = bytearray(), 0
     for event in case.wire:
         if event.direction == "received":
-            due += len(event.data)
+            due += event.data.count(CR)
             continue
         heard += wire.listen(event.time_s - origin_s - (wire.clock.now_s() - begin_s))
-        if len(heard) < due:
-            # What had come by now then is allowed the latency; a switched-off table would lose it.
-            heard += wire.listen(profile.serial.latency_s)
+        latest_s = wire.clock.now_s() + profile.serial.latency_s
+        while event.direction == "beside" and heard.count(CR) < due and wire.clock.now_s() < latest_s:
+            heard += wire.listen(_MOMENT_S)  # a table that is switched off now would lose what had come by now then
         _do(event, wire, stand)
     heard += wire.listen(case.wire[-1].time_s - origin_s - (wire.clock.now_s() - begin_s) + _AFTER_S)
     tolerance = profile.tolerance.tracking_deg + profile.resolution_deg
@@ -57,7 +58,9 @@ def _do(event: Event, wire: Wire, stand: Stand) -> None:
         wire.send(event.data)
         return
     deed, _, count = event.data.decode().partition(" ")
-    if deed == "preset":
+    if deed == "reopen":
+        wire.reopen()
+    elif deed == "preset":
         stand.preset(int(count))
     elif deed == "power_cycle":
         stand.power_cycle()

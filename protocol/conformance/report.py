@@ -157,9 +157,8 @@ def _wire(events: Sequence[Event]) -> str:
         rows.append(row)
         index += 1
     lines = "\n".join(rows)
-    return (
-        f'<details class="inner"><summary>the wire, {len(events)} events</summary><pre class="wire">{lines}</pre></details>'
-    )
+    summary = f"<summary>the wire, {len(events)} events</summary>"
+    return f'<details class="inner">{summary}<pre class="wire">{lines}</pre></details>'
 
 
 def _shown(data: bytes) -> str:

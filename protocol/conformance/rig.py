@@ -276,7 +276,8 @@ class Rig:
         running = [one for one in self.motion.expectations if one.began_s <= sample.time_s]
         window_s = sample.uncertainty_s + sum(one.uncertainty_s for one in running[-1:])
         positions = [
-            self.reference_at(sample.time_s + offset_s)[0] for offset_s in (-window_s, -window_s / 2, 0.0, window_s / 2, window_s)
+            self.reference_at(sample.time_s + offset_s)[0]
+            for offset_s in (-window_s, -window_s / 2, 0.0, window_s / 2, window_s)
         ]
         half_deg = self.profile.resolution_deg / 2
         low, high = min(positions) - half_deg, max(positions) + half_deg
@@ -303,7 +304,7 @@ class Unmoved:
             )
 
 
-def require(condition: bool, otherwise: str) -> None:  # noqa: FBT001  # reads as a sentence
+def require(condition: bool, otherwise: str) -> None:
     """Raise NonconformityError unless the condition holds."""
     if not condition:
         raise NonconformityError(otherwise)

@@ -114,7 +114,7 @@ class Session:
             return Verdict.FAIL, str(error)
         except (OSError, StandError) as error:
             return Verdict.ERROR, f"{type(error).__name__}: {error}"
-        except Exception as error:  # noqa: BLE001  # a fault of the case itself ends that case alone
+        except Exception as error:  # a fault of the case itself ends that case alone
             self._after_failure(case)
             return Verdict.ERROR, "".join(traceback.format_exception_only(error)).strip()
         failed = [measurement for measurement in rig.measurements if measurement.verdict is Verdict.FAIL]

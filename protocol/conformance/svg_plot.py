@@ -40,7 +40,8 @@ def range_bar(value: float, least: float | None, most: float | None, verdict: st
     high = most if most is not None else 2 * low if low > 0 else max(1.0, 2 * value)
     share = min(max((value - low) / (high - low) if high > low else 0.5, -0.12), 1.12)
     return (
-        '<svg class="bar" viewBox="0 0 130 12" role="img"><rect class="range" x="15" y="4" width="100" height="4" rx="2"/>'
+        '<svg class="bar" viewBox="0 0 130 12" role="img">'
+        '<rect class="range" x="15" y="4" width="100" height="4" rx="2"/>'
         f'<circle class="{verdict}" cx="{15 + 100 * share:.1f}" cy="6" r="4"/></svg>'
     )
 

@@ -1,5 +1,6 @@
 """The port as lines and times, with a record of every byte that passed."""
 
+from itertools import pairwise
 from typing import Literal, NamedTuple, Protocol
 
 from protocol.clock import Clock, clock_of
@@ -17,7 +18,7 @@ class ReopenablePort(Port, Protocol):
 
 
 class Event(NamedTuple):
-    """What passed at one time: the bytes of one write, a line received (at its first byte), or a deed beside the wire."""
+    """What passed at one time: the bytes of a write, a line received (at its first byte), or a deed beside the wire."""
 
     time_s: float
     direction: Literal["sent", "received", "beside"]
@@ -34,7 +35,7 @@ class RecordedPort:
     """
 
     def __init__(self, port: ReopenablePort) -> None:
-        self.inner = port
+        self.inner: ReopenablePort = port
         self.clock: Clock = clock_of(port)
         self.events: list[Event] = []
 
@@ -113,7 +114,7 @@ class Wire:
                 return None
         text, times = bytes(self._rest[:end]), self._times[: end + 1]
         del self._rest[: end + 1], self._times[: end + 1]
-        gaps = (later - earlier for earlier, later in zip(times, times[1:], strict=False))
+        gaps = (later - earlier for earlier, later in pairwise(times))
         return Line(text, times[0], times[-1], max(gaps, default=0.0))
 
     def listen(self, duration_s: float) -> bytes:
@@ -132,6 +133,7 @@ class Wire:
 
     def reopen(self) -> None:
         """Leave the port and come back, as a new client does."""
+        self.port.note("reopen")
         self.port.close()
         self.forget()
         self.port.open()

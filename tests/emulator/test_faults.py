@@ -13,7 +13,6 @@ import serial
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import emulator
 from emulator.config import ConfigError, load_config
 from emulator.control import COMMANDS
 from emulator.faults import KINDS, FaultError, fault_from, parameters_of
@@ -21,8 +20,6 @@ from emulator.protocol_emulator import Serial
 from emulator.table import Table
 from emulator.tick import step
 from protocol import PortError, ReplyTimeout, TableClient, TableError, UnexpectedReply
-
-assert emulator  # teaches pyserial the URL
 
 EXAMPLE: dict[str, dict[str, float]] = {
     "drop": {"probability": 0.3},
@@ -50,7 +47,7 @@ class Bench:
     """A table, its port, and a client that has found its place."""
 
     def __init__(self, url: str = "emulator://") -> None:
-        self.port: Serial = serial.serial_for_url(url, timeout=1)
+        self.port = Serial(url, timeout=1)
         self.table = self.port.table
         self.client = TableClient(self.port)
         self.client.position_deg()
@@ -288,16 +285,14 @@ def test_a_bounced_trigger_latches_a_later_position(fraction: float) -> None:
 
 def test_a_fault_can_wait_for_its_time_and_end(bench: Bench) -> None:
     bench.inject("silence", at_s=2.0, for_s=1.0)
-    silent = []
-    for _ in range(12):
-        silent.append(not bench.raw(b"H", 0.3))
+    silent = [not bench.raw(b"H", 0.3) for _ in range(12)]
     begin, end = silent.index(True), len(silent) - silent[::-1].index(True)
     assert all(silent[begin:end])
     assert 3 <= end - begin <= 4
 
 
 def test_a_fault_can_wait_for_the_nth_command() -> None:
-    port: Serial = serial.serial_for_url("emulator://", timeout=1)
+    port = Serial("emulator://", timeout=1)
     port.table.inject(fault_from("half-reply", {"bytes": 1, "at_command": 3}))
     replies = []
     for _ in range(4):
@@ -308,8 +303,10 @@ def test_a_fault_can_wait_for_the_nth_command() -> None:
 
 def test_faults_of_a_configuration_hold_from_the_start(tmp_path: Path) -> None:
     file = tmp_path / "faulty.toml"
-    file.write_text('[[faults]]\nfault = "silence"\nfor_s = 0.5\n\n[[faults]]\nfault = "half-reply"\nbytes = 2\nat_command = 2\n')
-    port: Serial = serial.serial_for_url(f"emulator://?config={file}", timeout=1)
+    file.write_text(
+        '[[faults]]\nfault = "silence"\nfor_s = 0.5\n\n[[faults]]\nfault = "half-reply"\nbytes = 2\nat_command = 2\n'
+    )
+    port = Serial(f"emulator://?config={file}", timeout=1)
     port.write(b"H\r")
     assert port.read(10) == b""
     port.write(b"H\r")
@@ -320,7 +317,9 @@ def test_faults_of_a_configuration_hold_from_the_start(tmp_path: Path) -> None:
 def test_the_three_ways_take_the_same_names_and_numbers(kind: str, tmp_path: Path) -> None:
     numbers = EXAMPLE[kind] | {"at_s": 1.0}
     file = tmp_path / "faulty.toml"
-    file.write_text("[[faults]]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in {"fault": kind, **numbers}.items()))
+    file.write_text(
+        "[[faults]]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in {"fault": kind, **numbers}.items())
+    )
     (from_file,) = load_config(file).faults
     got: list[Any] = []
     stand: Any = type("Stand", (), {"inject": lambda _, fault: got.append(fault)})()
@@ -340,11 +339,16 @@ def test_the_three_ways_take_the_same_names_and_numbers(kind: str, tmp_path: Pat
         ("stall", {"at_s": 1, "at_command": 1}, "stall: at_s and at_command are two beginnings"),
     ],
 )
-def test_what_is_no_fault_is_refused_in_one_line(kind: str, numbers: dict[str, float], words: str, tmp_path: Path) -> None:
+def test_what_is_no_fault_is_refused_in_one_line(
+    kind: str, numbers: dict[str, float], words: str, tmp_path: Path
+) -> None:
     with pytest.raises(FaultError, match=words):
         fault_from(kind, numbers)
     file = tmp_path / "faulty.toml"
-    file.write_text("[[faults]]\n" + "".join(f"{key} = {json.dumps(value).lower()}\n" for key, value in {"fault": kind, **numbers}.items()))
+    file.write_text(
+        "[[faults]]\n"
+        + "".join(f"{key} = {json.dumps(value).lower()}\n" for key, value in {"fault": kind, **numbers}.items())
+    )
     with pytest.raises(ConfigError, match=f"faulty.toml: faults: {words}"):
         load_config(file)
 
@@ -394,17 +398,14 @@ def test_a_tick_of_a_fault_without_force_is_that_of_a_sound_table(seed: int, tic
 
 
 @pytest.mark.realtime
-def test_a_pulled_port_comes_back_under_its_link(
-    stand_in: Callable[..., Any], tmp_path: Path, wait_until: Callable[[Callable[[], bool]], None]
-) -> None:
+def test_a_pulled_port_comes_back_under_its_link(stand_in: Callable[..., Any], tmp_path: Path) -> None:
     link, control = tmp_path / "table", tmp_path / "control"
     running = stand_in("--pty", "--link", str(link), "--control", str(control))
     with TableClient.open(str(link)) as client:
         assert client.position_deg() == 0.0
         command(control, "fault-hang-up", "--for-s", "0.3")
         with pytest.raises(TableError):
-            for _ in range(20):
-                client.position_deg()
+            read_often(client)
     running.wait_for_words("has come back")
     with TableClient.open(str(link)) as client:
         assert client.position_deg() == 0.0
@@ -420,8 +421,7 @@ def test_over_tcp_a_pulled_port_turns_clients_away(
         assert client.position_deg() == 0.0
         command(control, "fault-hang-up")
         with pytest.raises(TableError):
-            for _ in range(20):
-                client.position_deg()
+            read_often(client)
     command(control, "clear-faults")
 
     def answers() -> bool:
@@ -432,6 +432,11 @@ def test_over_tcp_a_pulled_port_turns_clients_away(
             return False
 
     wait_until(answers)
+
+
+def read_often(client: TableClient) -> None:
+    for _ in range(20):
+        client.position_deg()
 
 
 def command(control: Path, *words: str) -> None:

@@ -134,7 +134,12 @@ def _measure_trapezoid(rig: Rig) -> None:
     share = rig.profile.tolerance.acceleration_share
     for name, origin_deg, begin_s, end_s in (
         ("acceleration", motion.start_deg, 0.1 * up.duration_s, up.duration_s),
-        ("deceleration", motion.target_deg, motion.duration_s - down.duration_s, motion.duration_s - 0.1 * down.duration_s),
+        (
+            "deceleration",
+            motion.target_deg,
+            motion.duration_s - down.duration_s,
+            motion.duration_s - 0.1 * down.duration_s,
+        ),
     ):
         # Where the acceleration is constant from or to rest, sqrt(2 x) is a line of slope sqrt(A).
         roots = [

@@ -56,5 +56,3 @@ def _client_agrees(rig: Rig) -> None:
     position = client.position_deg()
     rig.wire.listen(0.1)
     require(position == float(rig.read()), f"the client read {position}, the suite {rig.read()}")
-
-

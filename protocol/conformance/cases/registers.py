@@ -75,7 +75,13 @@ def each_trigger_overwrites_the_latch(rig: Rig) -> None:
         rig.finish(f"at {target}")
         rig.stand.trigger()
         error = float(rig.read(b"L") - rig.read())
-        rig.measure(f"latch at {target}, from the position", error, "deg", -rig.profile.resolution_deg, rig.profile.resolution_deg)
+        rig.measure(
+            f"latch at {target}, from the position",
+            error,
+            "deg",
+            -rig.profile.resolution_deg,
+            rig.profile.resolution_deg,
+        )
 
 
 @case("6.2/2:power-on", POWER_CYCLE, travel_deg=10)

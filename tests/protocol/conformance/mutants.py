@@ -4,9 +4,6 @@ import re
 from collections.abc import Callable
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
 
-import serial
-
-import emulator
 from emulator.config import TableConfig, load_config
 from emulator.firmware import IDLE, MOVING, SETTLING
 from emulator.fixed_point import POSITION_BITS
@@ -15,26 +12,12 @@ from emulator.protocol_emulator import Serial
 from emulator.table import Table
 from protocol.messages import Command, ErrorCode, Verb
 
-assert emulator  # teaches pyserial the URL
-
 Line = Command | ErrorCode
-
-MUTANTS: dict[str, tuple[str, type[Table]]] = {}
-"""By what is wrong: the case that catches it, and the table."""
-
-
-def caught_by(case: str) -> Callable[[type[Table]], type[Table]]:
-    def register(kind: type[Table]) -> type[Table]:
-        assert kind.__doc__
-        MUTANTS[kind.__doc__] = (case, kind)
-        return kind
-
-    return register
 
 
 def port_to(kind: type[Table], config: TableConfig | None = None) -> Serial:
     """Return a port in virtual time to a table of this kind."""
-    port: Serial = serial.serial_for_url("emulator://", timeout=1)
+    port = Serial("emulator://", timeout=1)
     port.table = kind(config or load_config())
     return port
 
@@ -57,6 +40,19 @@ class Mutant(Table):
         reference = self._state.firmware.reference
         fixed = (reference.position_count + reference.distance_count << POSITION_BITS) + reference.fraction
         return Decimal(fixed + reference.distance_fraction) / (1 << POSITION_BITS) / 512
+
+
+MUTANTS: dict[str, tuple[str, type[Mutant]]] = {}
+"""By what is wrong: the case that catches it, and the table."""
+
+
+def caught_by(case: str) -> Callable[[type[Mutant]], type[Mutant]]:
+    def register(kind: type[Mutant]) -> type[Mutant]:
+        assert kind.__doc__
+        MUTANTS[kind.__doc__] = (case, kind)
+        return kind
+
+    return register
 
 
 # The serial line and lines

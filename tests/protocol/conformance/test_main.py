@@ -100,7 +100,9 @@ def test_what_cannot_be_done_is_one_clear_line(
 
 @pytest.fixture
 def record(tmp_path: Path) -> Path:
-    conformance("--port", "emulator://", "--case", "4.5", "--case", "5.2", "--case", "6.2", "--out", tmp_path / "recorded")
+    conformance(
+        "--port", "emulator://", "--case", "4.5", "--case", "5.2", "--case", "6.2", "--out", tmp_path / "recorded"
+    )
     return tmp_path / "recorded" / "record.json"
 
 

@@ -33,7 +33,10 @@ def test_a_profile_survives_its_record() -> None:
     [
         ("[motion]\nspeed_deg_s = 50\n", r"motion.speed_deg_s is 50; it must be greater than 0 and at most limits.spe"),
         ("[power_on]\nacceleration_deg_s2 = 0\n", r"power_on.acceleration_deg_s2 is 0; it must be greater than 0"),
-        ("[tolerance]\ntracking_deg = 0.01\n", r"tolerance.tracking_deg is 0.01; it must be more than tolerance.rest_deg"),
+        (
+            "[tolerance]\ntracking_deg = 0.01\n",
+            r"tolerance.tracking_deg is 0.01; it must be more than tolerance.rest_deg",
+        ),
         ("[serial]\ntimeout_s = 0.001\n", r"serial.timeout_s is 0.001; it must be more than serial.latency_s, 0.01"),
         ("[serial]\ndecimals = 9\n", r"serial.decimals is 9; it must be 1 to 6"),
         ("[serial]\ndecimals = 1.5\n", r"serial.decimals is 1.5; it must be a whole number from 0 up"),

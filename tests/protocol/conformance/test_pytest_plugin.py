@@ -12,7 +12,16 @@ ROOT = Path(__file__).parents[3]
 
 
 def run_pytest(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "protocol.conformance.pytest_plugin"]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "protocol.conformance.pytest_plugin",
+    ]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     return subprocess.run(
         [*command, *words], cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=120

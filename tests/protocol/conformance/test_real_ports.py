@@ -1,0 +1,80 @@
+"""The suite on a real pty and over TCP: a few short cases here, all of them in `.ci/conformance`."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+SHORT = ("2.2/1", "3.1/5", "5.1/2", "6.2/2:power-on", "6.1/5", "7.3/3:near")
+COMMAND = [sys.executable, "-m", "protocol.conformance", "--yes"]
+
+pytestmark = pytest.mark.realtime
+
+
+class StandIn:
+    """A running stand-in, its port and its control channel."""
+
+    def __init__(self, process: "subprocess.Popen[str]", control: Path) -> None:
+        assert process.stdout is not None
+        self.port = process.stdout.readline().strip()
+        self.control = control
+
+
+@pytest.fixture(params=[("--pty",), ("--tcp", "0")], ids=["pty", "tcp"])
+def stand_in(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[StandIn]:
+    control = tmp_path / "control"
+    command = [sys.executable, "-m", "emulator", *request.param, "--control", str(control)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        try:
+            yield StandIn(process, control)
+        finally:
+            process.terminate()
+
+
+def test_the_stand_in_conforms_in_real_time(stand_in: StandIn, tmp_path: Path) -> None:
+    cases = [word for case in SHORT for word in ("--case", case)]
+    words = ["--port", stand_in.port, "--control", str(stand_in.control), *cases, "--out", str(tmp_path / "out")]
+    result = subprocess.run([*COMMAND, *words], capture_output=True, text=True, check=False, timeout=120)
+    assert result.returncode == 0, result.stdout + result.stderr
+    record = json.loads((tmp_path / "out" / "record.json").read_text())
+    assert record["begun"]
+    assert {case["verdict"] for case in record["cases"]} <= {"pass", "marginal"}
+
+
+def test_ctrl_c_stops_the_table_and_leaves_the_record(stand_in: StandIn, tmp_path: Path) -> None:
+    words = ["--port", stand_in.port, "--control", str(stand_in.control), "--case", "4.2/3", "--out", str(tmp_path / "out")]
+    with subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        wait_for_motion(stand_in.control)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert "interrupted after 0 of 1 cases; the table was stopped" in said
+    state = state_of(stand_in.control)
+    assert (state["state"], round(float(str(state["encoder_deg"])))) == ("idle", 0)
+    assert (tmp_path / "out" / "record.json").exists()
+
+
+def wait_for_motion(control: Path) -> None:
+    end_s = time.monotonic() + 20
+    while time.monotonic() < end_s:
+        if control.exists() and state_of(control)["state"] == "moving":
+            return
+        time.sleep(0.1)
+    pytest.fail("the table did not move")
+
+
+def state_of(control: Path) -> dict[str, object]:
+    result = subprocess.run(
+        [sys.executable, "-m", "emulator.control_client", str(control), "state"],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=20,
+    )
+    state: dict[str, object] = json.loads(result.stdout)
+    return state

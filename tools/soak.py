@@ -1,0 +1,205 @@
+"""Long runs of the stand-in, each with what must hold at its end: `python -m tools.soak noise day clients wrap`.
+
+A soak is small in the tests and full here; both run these functions.
+"""
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from random import Random
+from typing import NamedTuple
+
+from emulator.config import load_config
+from emulator.table import Table
+from protocol.client import TableClient
+from protocol.codec import decode_reply
+from protocol.messages import Angle, Ok, Refusal
+
+_TICK_HZ = 1000
+
+
+class Soak(NamedTuple):
+    """What was done and what was found: named figures, and what went wrong."""
+
+    figures: dict[str, str]
+    faults: list[str]
+
+
+def soak_noise(size: float, seed: int) -> Soak:
+    """Send random bytes in pieces of random size; no reply may be out of place, and the table may not move.
+
+    Random bytes now and then say `P5` or `R-3`: those letters are left out, so that nothing asks for a motion.
+    """
+    chance = Random(seed)  # noqa: S311 - noise is no secret
+    table = Table(load_config().with_serial(baud=0), seed)
+    alphabet = bytes(byte for byte in range(256) if byte not in b"PR")
+    before = table.status().encoder_deg
+    sent = replies = refusals = 0
+    strange: list[str] = []
+    while sent < round(size):
+        piece = bytes(
+            chance.choices(
+                alphabet + b"\r" * 20 + b"HLSA 0123456789.-+" * 4, k=min(chance.randint(1, 4000), round(size) - sent)
+            )
+        )
+        sent += len(piece)
+        table.receive(piece)
+        for line in table.transmit().split(b"\r")[:-1]:
+            replies += 1
+            reply = decode_reply(line)
+            refusals += isinstance(reply, Refusal)
+            if isinstance(reply, Angle) and reply.angle_deg != 0:
+                strange.append(f"{line!r} from a table that rests at 0")
+        table.receive(b"\r")
+        table.transmit()
+        table.receive(b"H\rL\rS 10\r")
+        got = [decode_reply(line) for line in table.transmit().split(b"\r")[:-1]]
+        if [type(reply) for reply in got] != [Angle, Angle, Ok]:
+            strange.append(f"after {sent} bytes 'H', 'L', 'S 10' got {got}")
+        table.advance(chance.randint(0, 50))
+    moved = table.status().encoder_deg - before
+    faults = strange[:5] + ([f"the table moved by {moved} deg"] if moved else [])
+    return Soak({"bytes": f"{sent:,}", "replies": f"{replies:,}", "refused": f"{refusals:,}"}, faults)
+
+
+def soak_day(hours: float, seed: int) -> Soak:
+    """Let random commands run for simulated hours: memory stays flat, count and true angle never drift apart."""
+    chance = Random(seed)  # noqa: S311 - no secret
+    config = load_config()
+    table = Table(config, seed)
+    half_gap_deg = config.gears.backlash_arcmin / 60 / 2
+    end, commands, worst_deg = round(hours * 3600 * _TICK_HZ), 0, 0.0
+    sizes_kB: list[int] = []
+    while table.tick < end:
+        table.receive(_random_command(chance))
+        commands += 1
+        table.advance(min(chance.choice((20, 200, 2000, 20_000, 100_000)), end - table.tick))
+        table.transmit()
+        status = table.status()
+        worst_deg = max(worst_deg, abs(status.encoder_deg - status.true_deg))
+        if commands % 100 == 0:
+            sizes_kB.append(_memory_kB())
+    # The encoder's own step, and where the shaft stood between two of them, come on top of the gap.
+    allowed_deg = 2 * half_gap_deg + 2 / config.counts_per_turn * 360
+    growth_kB = sizes_kB[-1] - sizes_kB[len(sizes_kB) // 4] if sizes_kB else 0  # after the first quarter
+    figures = {
+        "simulated": f"{table.tick / _TICK_HZ / 3600:.1f} h",
+        "commands": f"{commands:,}",
+        "count from true angle": f"{worst_deg:.4f} deg (backlash {2 * half_gap_deg:.4f})",
+        "memory growth": f"{growth_kB} kB",
+    }
+    faults = [] if worst_deg <= allowed_deg else [f"count and true angle are {worst_deg:.3f} deg apart"]
+    return Soak(figures, faults + ([f"memory grew by {growth_kB} kB"] if growth_kB > 1024 else []))
+
+
+def soak_clients(count: float, seed: int) -> Soak:
+    """Let clients come and go on a pty, some of them in mid-line; each finds a table that answers."""
+    chance = Random(seed)  # noqa: S311 - no secret
+    faults: list[str] = []
+    with tempfile.TemporaryDirectory() as folder, _stand_in(Path(folder) / "table") as (link, process):
+        descriptors = _descriptors(process)
+        for index in range(round(count)):
+            with TableClient.open(link, timeout_s=2.0) as client:
+                position = client.position_deg()
+                if position != 0.0:
+                    faults.append(f"client {index} read {position} deg")
+            if chance.random() < 0.5:
+                with Path(link).open("wb", buffering=0) as half:
+                    half.write(chance.choice((b"R 5", b"P", b"H", b"S 1")))
+        leaked = _descriptors(process) - descriptors
+    if leaked:
+        faults.append(f"{leaked} descriptors were left open")
+    return Soak({"clients": f"{round(count):,}", "open descriptors left": str(leaked)}, faults)
+
+
+def soak_wrap(count: float, seed: int) -> Soak:
+    """Let the counter run over its end in motion, both ways, again and again: the motion goes on."""
+    table = Table(load_config().with_serial(baud=0), seed)
+    faults = []
+    for index in range(round(count)):
+        direction = 1 if index % 2 == 0 else -1
+        table.reset(direction * (2**31 - 2000) - (direction < 0))
+        start = table.status()
+        table.receive(b"S 40\rA 100\rR %d\r" % (20 * direction))
+        table.advance(3000)
+        status = table.status()
+        travelled = status.encoder_deg - start.encoder_deg + direction * 2**32 / 512
+        turned = status.true_deg - start.true_deg
+        if abs(travelled - 20 * direction) > 0.05 or abs(turned - 20 * direction) > 0.3:
+            faults.append(f"run {index}: {travelled:.3f} deg counted, {turned:.3f} deg turned, of {20 * direction}")
+    return Soak({"wraps": f"{count:g}"}, faults[:5])
+
+
+SOAKS: dict[str, tuple[Callable[[float, int], Soak], float, str]] = {
+    "noise": (soak_noise, 10_000_000, "random bytes"),
+    "day": (soak_day, 24.0, "simulated hours of random commands"),
+    "clients": (soak_clients, 1000, "clients that come and go on a pty"),
+    "wrap": (soak_wrap, 100, "runs over the end of the counter"),
+}
+"""Each soak by its name: what runs it, its full size, and the unit of that."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the named soaks; return 1 when something did not hold."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tools.soak",
+        description="Run the stand-in for long, and look whether all that must hold still holds.",
+        epilog="example: python -m tools.soak noise --share 0.01",
+    )
+    parser.add_argument("name", nargs="+", choices=SOAKS)
+    parser.add_argument("--share", type=float, default=1.0, metavar="X", help="of the full size (default 1)")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of all that is left to chance (default 0)"
+    )
+    options = parser.parse_args(arguments)
+    failed = False
+    for name in options.name:
+        run, full, unit = SOAKS[name]
+        size = full * options.share
+        sys.stderr.write(f"soak {name}: {size:g} {unit}\n")
+        soak = run(size, options.seed)
+        failed = failed or bool(soak.faults)
+        print(f"{name}: " + ", ".join(f"{key} {value}" for key, value in soak.figures.items()))
+        for fault in soak.faults:
+            print(f"  FAULT: {fault}")
+    return int(failed)
+
+
+def _random_command(chance: Random) -> bytes:
+    verb = chance.choice(("P", "R", "R", "S", "A", "H", "L"))
+    bounds = {"P": (-3600, 3600), "R": (-200, 200), "S": (20, 400), "A": (50, 1000)}
+    if verb not in bounds:
+        return f"{verb}\r".encode()
+    return f"{verb} {chance.randint(*bounds[verb]) / 10}\r".encode()
+
+
+def _memory_kB() -> int:
+    """Return the memory that this process has in use."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * resource.getpagesize() // 1024
+
+
+def _descriptors(process: "subprocess.Popen[str]") -> int:
+    return len(list(Path(f"/proc/{process.pid}/fd").iterdir()))
+
+
+@contextmanager
+def _stand_in(link: Path) -> "Iterator[tuple[str, subprocess.Popen[str]]]":
+    """Run a stand-in on a pty under a link."""
+    command = [sys.executable, "-m", "emulator", "--pty", "--link", str(link), "--baud", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        assert process.stdout is not None
+        try:
+            process.stdout.readline()
+            yield str(link), process
+        finally:
+            process.terminate()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
