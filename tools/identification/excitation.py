@@ -7,9 +7,9 @@
 | quick swings | inertia, and backlash: the teeth part, and meet again |
 
 A swing speeds up one way, then the other, and never holds a speed, so one gain set alone is at work. Each motion is
-replaced by the next before it ends, so the regulator's integral is never reset: then the lag is the integral of the speed
-error, and tells the duty. (A change of the gain set would keep the duty, and so forget a little of the lag.) No swing is narrower than a
-degree: within a wider gap the table would float, and no one could tell where.
+replaced by the next before it ends, so the regulator's integral is never reset: then the lag is the integral of the
+speed error, and tells the duty. (A change of the gain set would keep the duty, and so forget a little of the lag.) No
+swing is narrower than a degree: within a wider gap the table would float, and no one could tell where.
 """
 
 from random import Random
