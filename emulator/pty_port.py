@@ -85,7 +85,10 @@ class PtyPort:
         left, wrote_since = self._follow_clients()
         if left and not wrote_since:
             # All that is there is of the one that left: taken whole, the next one's bytes come apart from it.
-            arrival = Arrival(data=self._read(whole=True), left_after=True)
+            data = self._read(whole=True)
+            # But another may have come and written while we looked: then it is not the end of this.
+            _, wrote_since = self._follow_clients(left=True)
+            arrival = Arrival(left_before=wrote_since, data=data, left_after=not wrote_since)
         else:
             arrival = Arrival(left_before=left, data=self._read())
         if left:
@@ -138,9 +141,9 @@ class PtyPort:
                 data += os.read(self._server, READ_BYTES)
         return self._as_heard(bytes(data), self._client_baud, self._baud)
 
-    def _follow_clients(self) -> tuple[bool, bool]:
+    def _follow_clients(self, left: bool = False) -> tuple[bool, bool]:
         """Return whether the last client left since the last call, and whether another wrote after that."""
-        left = wrote_since = False
+        wrote_since = False
         for event in self._watch.events() if self._watch is not None else ():
             if event == OPENED:
                 self._clients += 1
