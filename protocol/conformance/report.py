@@ -1,5 +1,6 @@
 """The report: one HTML file that needs nothing else, for an engineer to read and to send on."""
 
+import re
 from collections.abc import Callable, Sequence
 from html import escape
 from importlib.resources import files
@@ -27,6 +28,8 @@ _CHAPTERS = {
 _LINE_STEP_S = 0.01
 _SPEED_WINDOW_S = 0.06
 _MOST_POINTS = 900
+
+_EMPHASIS = re.compile(r"\*([^*]+)\*")
 
 Repeat = Callable[[Case], str]
 """Returns the command that repeats a case alone."""
@@ -166,6 +169,9 @@ def _shown(data: bytes) -> str:
 
 
 def _marked(text: str) -> str:
-    """Return a sentence with its `code` marked up."""
+    """Return a sentence of the specification with its `code` and its *figures* marked up."""
     pieces = escape(text, quote=False).split("`")
-    return "".join(f"<code>{piece}</code>" if index % 2 else piece for index, piece in enumerate(pieces))
+    return "".join(
+        f"<code>{piece}</code>" if index % 2 else _EMPHASIS.sub(r"<em>\1</em>", piece)
+        for index, piece in enumerate(pieces)
+    )

@@ -8,6 +8,9 @@ from protocol.messages import ErrorCode
 _TRAIN = 8
 """Commands sent at once, so that their replies follow one another."""
 
+_READS, _OUTLIERS = 20, 2
+"""Reads that are timed, and how many of the longest are left to the tester's own machine."""
+
 
 @case("2.1/1", PACING)
 def bytes_take_ten_bits(rig: Rig) -> None:
@@ -36,13 +39,12 @@ def there_is_no_flow_control(rig: Rig) -> None:
 
 @case("2.2/1")
 def a_reply_begins_soon(rig: Rig) -> None:
-    """Measure, over 20 reads, the time from the end of the command to the first byte of the reply."""
+    """Time 20 reads, from the end of the command to the first byte of the reply; all but two must be quick."""
     delays_s = []
-    for _ in range(20):
+    for _ in range(_READS):
         sent_s = rig.wire.send(b"H\r")
         delays_s.append(rig.reply_to(b"H").first_s - sent_s - 3 * rig.profile.byte_s)
-    allowed_s = 0.010 + rig.profile.serial.latency_s
-    rig.measure("longest wait for a reply", 1000 * max(delays_s), "ms", most=1000 * allowed_s)
+    _measure_longest(rig, "longest wait for a reply", delays_s)
 
 
 @case("2.2/2", travel_deg=20)
@@ -60,9 +62,8 @@ def a_reply_does_not_wait_for_a_motion(rig: Rig) -> None:
 
 @case("2.2/3")
 def the_bytes_of_a_reply_come_without_gaps(rig: Rig) -> None:
-    """Measure, over 20 reads, the longest time between two bytes of a reply."""
-    gap_s = max(rig.ask(b"H").gap_s for _ in range(20))
-    rig.measure("longest gap in a reply", 1000 * gap_s, "ms", most=1000 * (0.010 + rig.profile.serial.latency_s))
+    """Time the longest gap between two bytes in each of 20 replies; all but two must be short."""
+    _measure_longest(rig, "longest gap in a reply", [rig.ask(b"H").gap_s for _ in range(_READS)])
 
 
 @case("2.3/1")
@@ -97,3 +98,8 @@ def lines_after_a_flood_are_read(rig: Rig) -> None:
     rig.wire.listen(QUIET_S)
     rig.read(b"H")
     rig.read(b"L")
+
+
+def _measure_longest(rig: Rig, name: str, times_s: list[float]) -> None:
+    longest_s = sorted(times_s)[-1 - _OUTLIERS]
+    rig.measure(f"{name}, but for {_OUTLIERS}", 1000 * longest_s, "ms", most=10 + 1000 * rig.profile.serial.latency_s)

@@ -47,7 +47,16 @@ def test_the_stand_in_conforms_in_real_time(stand_in: StandIn, tmp_path: Path) -
 
 
 def test_ctrl_c_stops_the_table_and_leaves_the_record(stand_in: StandIn, tmp_path: Path) -> None:
-    words = ["--port", stand_in.port, "--control", str(stand_in.control), "--case", "4.2/3", "--out", str(tmp_path / "out")]
+    words = [
+        "--port",
+        stand_in.port,
+        "--control",
+        str(stand_in.control),
+        "--case",
+        "4.2/3",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     with subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         wait_for_motion(stand_in.control)
         process.send_signal(signal.SIGINT)
