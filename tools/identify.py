@@ -77,7 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(required=True)
     recorder = commands.add_parser(
-        "record", help="move a table and record its answers (it turns about half a turn each way)"
+        "record", help="move a table and record its answers (within a quarter of a turn, by default)"
     )
     recorder.add_argument("--port", required=True, metavar="URL", help="/dev/ttyUSB0, socket://host:7000, emulator://")
     recorder.add_argument("--out", required=True, type=Path, metavar="FILE", help="the CSV to write")

@@ -58,11 +58,3 @@ def test_a_drives_duty_tells_the_constants_more_sharply(assumed: TableConfig, un
     assert constants["backlash"].value == pytest.approx(truth.gears.backlash_arcmin, rel=0.1)
     assert constants["delay"].value == pytest.approx(1.0, abs=0.25)  # the PWM's buffer
     assert constants["delay"].told
-
-
-def test_without_reversals_the_backlash_is_not_told(assumed: TableConfig) -> None:
-    answer = emulate(assumed, [Motion(0.1, 1000.0, 20.0, 100.0)], 12.0)
-
-    found = identify(assumed, DriveRecording(answer.time_s, answer.duty, answer.encoder_deg))
-
-    assert not {constant.name: constant.told for constant in found.constants}["backlash"]

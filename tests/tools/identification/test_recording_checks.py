@@ -96,3 +96,10 @@ def test_a_drive_that_cannot_be_understood_is_refused(
 
     with pytest.raises(RecordingError, match=complaint):
         check_recording(assumed, DriveRecording(time_s, duty, position))
+
+
+def test_a_drive_that_never_reverses_is_refused(assumed: TableConfig) -> None:
+    time_s = np.arange(0.0, 12.0, 0.001)
+
+    with pytest.raises(RecordingError, match="never changes its sign"):
+        check_recording(assumed, DriveRecording(time_s, np.full(12_000, 0.3), 18.0 * time_s))
