@@ -1,4 +1,5 @@
 import math
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from planner.signed_distance_field import (
     SignedDistanceField,
@@ -35,13 +37,62 @@ def field() -> SignedDistanceField:
     return build_field(mould(), SPACING_MM)
 
 
-def exact_distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    return -np.asarray(trimesh.proximity.signed_distance(mould(), points))  # type: ignore[no-untyped-call]  # no types
+def exact_distances(points: NDArray[np.float64], mesh: trimesh.Trimesh | None = None) -> NDArray[np.float64]:
+    mesh = mesh or mould()
+    return -np.asarray(trimesh.proximity.signed_distance(mesh, points))  # type: ignore[no-untyped-call]  # no types
 
 
 def walked(a: tuple[float, ...], b: tuple[float, ...], enough_mm: float = math.inf) -> float:
     (ax, ay, az), (bx, by, bz) = a, b
     return field_distance(*field(), ax, ay, az, bx, by, bz, enough_mm)
+
+
+def hollow_box() -> trimesh.Trimesh:
+    hole = trimesh.creation.icosphere(subdivisions=2, radius=20.0)
+    hole.invert()
+    return joined(trimesh.creation.box((60.0, 60.0, 60.0)), hole)
+
+
+def joined(*shells: trimesh.Trimesh) -> trimesh.Trimesh:
+    mesh = trimesh.util.concatenate(shells)
+    assert isinstance(mesh, trimesh.Trimesh)
+    return mesh
+
+
+PARTS: dict[str, Callable[[], trimesh.Trimesh]] = {
+    "convex": lambda: trimesh.creation.icosphere(subdivisions=3, radius=30.0),
+    "concave": mould,
+    "round and concave": lambda: trimesh.creation.torus(40.0, 12.0, 16, 12),
+    "thinner than the spacing": lambda: trimesh.creation.box((60.0, 50.0, 1.5)),
+    "walls on the grid's lines": lambda: trimesh.creation.box((40.0, 32.0, 24.0)),
+    "hollow": hollow_box,
+}
+
+
+def grid_points(field: SignedDistanceField) -> NDArray[np.float64]:
+    return field.origin_mm + field.spacing_mm * np.moveaxis(np.indices(field.values_mm.shape), 0, -1).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("turned_deg", [0.0, 35.0])
+def test_the_grid_holds_the_distance_that_trimesh_finds(part: str, turned_deg: float) -> None:
+    mesh = PARTS[part]().copy()
+    turn = np.eye(4)
+    turn[:3, :3] = Rotation.from_rotvec([turned_deg, 0.3 * turned_deg, 0.7 * turned_deg], degrees=True).as_matrix()
+    mesh.apply_transform(turn)
+    built = build_field(mesh, SPACING_MM)
+    rng = np.random.default_rng(0)
+    chosen = rng.permutation(built.values_mm.size)[:1500]
+    exact = exact_distances(grid_points(built)[chosen], mesh)
+    excess = built.values_mm.ravel()[chosen] - exact
+    assert excess.max() <= 1e-4
+    assert excess.min() >= -0.002 * SPACING_MM
+
+
+def test_what_two_overlapping_shells_share_is_inside() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=20.0)
+    both = joined(ball, ball.copy().apply_translation((15.0, 0.0, 0.0)))
+    assert look_up(*build_field(both, SPACING_MM), 7.5, 0.0, 0.0) < 0.0
 
 
 def test_within_its_grid_a_field_is_half_a_cell_off_at_most() -> None:

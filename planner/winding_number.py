@@ -1,0 +1,66 @@
+"""The winding number of a closed surface about each point of a grid: whether the point is inside."""
+
+from math import ceil, floor, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.arrays import FloatArray
+from planner.kernel import kernel
+
+BESIDE = 1e-3 / sqrt(2.0), 1e-3 / sqrt(3.0)
+"""How far, in grid spacings along x and y, a line that is followed through the surface runs beside the grid's own.
+
+Parts made of round numbers have walls and edges exactly on the grid's lines, where rounding would decide what is in.
+"""
+
+
+def winding_numbers(
+    triangles: FloatArray, origin: FloatArray, spacing_mm: float, shape: tuple[int, ...]
+) -> NDArray[np.int32]:
+    """Return how often the surface is wound around each point of the grid: above 0 inside, 0 outside.
+
+    It is the number of faces above the point that look up, less those that look down. The line followed upwards runs
+    beside the point by `BESIDE`, so the number can only be wrong where the distance is less than that.
+
+    Args:
+        triangles: `(n, 3, 3)`, the corners of a closed surface in mm, counterclockwise seen from outside.
+        origin: `(3,)`, the grid's first point.
+        spacing_mm: The grid's spacing.
+        shape: The grid's points along x, y and z.
+    """
+    crossings = np.zeros(shape, dtype=np.int32)
+    corners = (triangles - origin) / spacing_mm - (*BESIDE, 0.0)
+    _count_crossings(np.ascontiguousarray(corners), crossings)
+    above: NDArray[np.int32] = np.cumsum(crossings[:, :, ::-1], axis=2, dtype=np.int32)[:, :, ::-1]
+    return above
+
+
+@kernel
+def _count_crossings(triangles: FloatArray, crossings: NDArray[np.int32]) -> None:
+    """Add each crossing of a vertical grid line with a triangle to the highest grid point below it.
+
+    Corners `(n, 3, 3)` are in grid spacings from the grid's first point. What a line's side of an edge is comes out
+    with the opposite sign, bit for bit, for the neighbour that has the edge the other way round, so a line through a
+    closed surface slips through no edge.
+    """
+    nx, ny, nz = crossings.shape
+    for t in range(len(triangles)):
+        c = triangles[t]
+        least_x, most_x = min(c[0, 0], c[1, 0], c[2, 0]), max(c[0, 0], c[1, 0], c[2, 0])
+        least_y, most_y = min(c[0, 1], c[1, 1], c[2, 1]), max(c[0, 1], c[1, 1], c[2, 1])
+        for i in range(max(ceil(least_x), 0), min(floor(most_x), nx - 1) + 1):
+            for j in range(max(ceil(least_y), 0), min(floor(most_y), ny - 1) + 1):
+                side_0 = (c[1, 0] - i) * (c[2, 1] - j) - (c[2, 0] - i) * (c[1, 1] - j)
+                side_1 = (c[2, 0] - i) * (c[0, 1] - j) - (c[0, 0] - i) * (c[2, 1] - j)
+                side_2 = (c[0, 0] - i) * (c[1, 1] - j) - (c[1, 0] - i) * (c[0, 1] - j)
+                up = side_0 > 0.0
+                if up != (side_1 > 0.0) or up != (side_2 > 0.0):
+                    continue
+                area = side_0 + side_1 + side_2
+                if area == 0.0:
+                    continue
+                height = (side_0 * c[0, 2] + side_1 * c[1, 2] + side_2 * c[2, 2]) / area
+                below = min(ceil(height), nz) - 1
+                if below >= 0:
+                    crossings[i, j, below] += 1 if up else -1
