@@ -21,7 +21,7 @@ from tools.identification.simulation import (
 )
 from tools.tuning.linear_model import Teeth, load_ratio, speed_gain_deg_s, time_constant_s
 
-_BACKLASH_STARTS_ARCMIN = (3.0, 8.0, 18.0, 32.0, 55.0)
+_BACKLASH_STARTS_ARCMIN = (1.5, 3.0, 6.0, 12.0, 22.0, 36.0, 56.0)
 _SURE_95 = 1.96
 _TOLD_SHARE = 0.5
 """A constant is told by a recording that at least halves what was uncertain of it."""
