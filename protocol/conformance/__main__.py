@@ -49,6 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (UsageError, ProfileError, RecordError, SessionError, StandError, OSError) as error:
         _say(str(error))
         return 2
+    except KeyboardInterrupt:
+        _say("interrupted; the table was stopped")
+        return 2
 
 
 def _on_the_table(options: argparse.Namespace, cases: Sequence[Case]) -> int:
@@ -195,8 +198,10 @@ def _replay(options: argparse.Namespace, profile: Profile, port: ReopenablePort)
                 parting = replay(case, wire, stand, profile)
                 parted += parting is not None
                 print(f"{'parts' if parting else 'same':9} {case.id}{f': {parting}' if parting else ''}", flush=True)
-    finally:
+    except BaseException:
         session.stop()
+        raise
+    session.end()
     print(f"{parted} of {sum(case.id in wanted for case in record.cases)} cases part")
     return int(parted > 0)
 

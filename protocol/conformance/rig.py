@@ -242,7 +242,8 @@ class Rig:
     def wait_for_rest(self) -> Decimal:
         """Return the position once it stays the same."""
         readings: list[Decimal] = []
-        deadline_s = self.wire.clock.now_s() + _REST_TIMEOUT_S
+        allowed = self.profile.motion
+        deadline_s = self.wire.clock.now_s() + _REST_TIMEOUT_S + 2 * allowed.reach_deg / allowed.speed_deg_s
         while len(readings) < _REST_READINGS or len(set(readings[-_REST_READINGS:])) > 1:
             require(self.wire.clock.now_s() < deadline_s, f"the table does not come to rest: {readings[-3:]}")
             if readings:

@@ -3,6 +3,7 @@
 import re
 import traceback
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
 from random import Random
@@ -58,14 +59,16 @@ class Session:
         self._is_home = False
 
     def run(self, cases: Iterable[Case], report: Callable[[Outcome], None] = lambda _: None) -> list[Outcome]:
-        """Run cases one after the other; the table is stopped whatever ends the run, Ctrl-C too."""
+        """Run cases one after the other, and bring the table home; what breaks into it, as Ctrl-C, stops the table."""
         outcomes = []
         try:
             for one in cases:
                 outcomes.append(self.run_case(one))
                 report(outcomes[-1])
-        finally:
+        except BaseException:
             self.stop()
+            raise
+        self.end()
         return outcomes
 
     def run_case(self, case: Case) -> Outcome:
@@ -74,7 +77,7 @@ class Session:
         if lacking:
             return Outcome(case, Verdict.SKIPPED, lacking)
         first_event, begin_s = len(self._port.events), self._port.clock.now_s()
-        rig = Rig(self._wire, self._profile, self._stand, self.home_deg, Random(f"{self._seed} {case.id}"))  # noqa: S311  # no secret
+        rig = self._rig(case.id)
         verdict, reason = self._judged(case, rig)
         self._is_home = self._is_home and verdict is not Verdict.ERROR
         seconds = self._port.clock.now_s() - begin_s
@@ -83,20 +86,26 @@ class Session:
         return Outcome(case, verdict, reason, tuple(rig.measurements), motion, events, seconds)
 
     def stop(self) -> None:
-        """Stop the table, and bring it back to where the session began, if it still answers."""
+        """Stop the table where it is, whatever is on the line, if it still answers."""
         self._is_home = False
-        try:
+        with suppress(NonconformityError, OSError):
             self._wire.send(_CANCEL + b"R 0\r")
             self._wire.listen(_SETTLE_S)
+            self._rig("stop").wait_for_rest()
+
+    def end(self) -> None:
+        """Stop the table, and bring it back to where the session began."""
+        self.stop()
+        with suppress(NonconformityError, OSError):
             self._go_home()
-        except (NonconformityError, OSError):
-            return
 
     def _go_home(self) -> None:
-        rig = Rig(self._wire, self._profile, self._stand, self.home_deg, Random(0))  # noqa: S311  # not used
-        rig.wait_for_rest()
-        rig.go_home()
+        self._rig("home").go_home()
         self._is_home = True
+
+    def _rig(self, purpose: str) -> Rig:
+        chance = Random(f"{self._seed} {purpose}")  # noqa: S311  # no secret
+        return Rig(self._wire, self._profile, self._stand, self.home_deg, chance)
 
     def _judged(self, case: Case, rig: Rig) -> tuple[Verdict, str]:
         """Return verdict and reason of a case, with the table stopped and its line empty where it failed."""
@@ -153,7 +162,7 @@ class Session:
             except StandError:
                 return
             self.home_deg = 0
-        self.stop()
+        self.end()
 
     def _first_position(self) -> Decimal:
         """Return where the table rests, or say why it cannot be tested."""
@@ -164,9 +173,9 @@ class Session:
         for _ in range(2):
             self._wire.send(b"H\r")
             line = self._wire.read_line(timeout_s)
-            heard = b"" if line is None else line.text + b"\r"
+            heard = self._wire.forget() if line is None else line.text + b"\r"
             found = _POSITION.search(heard)
-            if not heard and not self._wire.forget():
+            if not heard:
                 raise SessionError(
                     f"no answer to 'H' within {timeout_s:g} s; is the table on, the cable right, "
                     f"and its rate {self._profile.serial.baud} baud?"

@@ -27,7 +27,7 @@ def session(pytestconfig: pytest.Config) -> Iterator[Session]:
     except (ProfileError, SessionError, StandError) as error:
         pytest.exit(str(error), returncode=2)
     yield one
-    one.stop()
+    one.end()
     port.close()
 
 

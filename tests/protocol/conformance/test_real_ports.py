@@ -64,7 +64,8 @@ def test_ctrl_c_stops_the_table_and_leaves_the_record(stand_in: StandIn, tmp_pat
     assert process.returncode == 2
     assert "interrupted after 0 of 1 cases; the table was stopped" in said
     state = state_of(stand_in.control)
-    assert (state["state"], round(float(str(state["encoder_deg"])))) == ("idle", 0)
+    assert state["state"] == "idle"
+    assert 1.0 < float(str(state["encoder_deg"])) < 369.0  # where it was, neither at home nor at its target
     assert (tmp_path / "out" / "record.json").exists()
 
 
