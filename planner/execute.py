@@ -7,18 +7,23 @@ record of what was sent and seen is complete whatever happens.
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from planner.closest_command import LATEST_S
+from planner.errors import PlannerError
 from planner.inside_view import InsideView
 from planner.motion import Limits
-from planner.stream import LATEST_S, TimedCommand, Wire, check_it_fits, command_line, exchanges_s, stream
-from planner.table_motion import Phase, TableMotion
+from planner.run_record import Correction, Observation, Record, Sent
+from planner.stream import TimedCommand, check_it_fits, stream
+from planner.table_motion import TableMotion
 from planner.velocity_profile import MotionCommand, ReferenceState, advance, time_to_rest_s
+from planner.wire import Wire, command_line, exchanges_s
 from protocol import ArrivalTimeout, CommandRefused, TableClient, TableError, Verb
 
 # What the bytes of H and of its answer come to.
 _READING_BYTES = 12
+# A table at rest is within this of its target: 0.05 deg, and the rounding of its answer.
+_AT_REST_DEG = 0.15
 # Between the last poll and the next command: what the operating system may take.
 _SLACK_S = 0.005
 
@@ -55,62 +60,6 @@ class Settings(NamedTuple):
     look_s: float = 0.02
 
 
-class Sent(NamedTuple):
-    """A motion command as it was sent; times in s of the motion, `late_s` against its schedule."""
-
-    time_s: float
-    late_s: float
-    phase: Phase
-    column: int
-    command: MotionCommand
-
-
-class Observation(NamedTuple):
-    """Where the table was seen, in degrees.
-
-    Attributes:
-        time_s: when, in the time of the motion.
-        source: "H", "L", or "inside" for a look that a stand-in allowed.
-        encoder_deg: the encoder, as `source` tells it.
-        column: the scan location whose trigger this belongs to.
-        reference_deg: the controller's reference, where it was told.
-        true_deg: the table's own angle, where it was told.
-    """
-
-    time_s: float
-    source: str
-    encoder_deg: float
-    column: int | None = None
-    reference_deg: float | None = None
-    true_deg: float | None = None
-
-
-class Correction(NamedTuple):
-    """From `time_s` on the stream was computed anew: the table was `drift_deg` ahead of where it was expected."""
-
-    time_s: float
-    drift_deg: float
-
-
-@dataclass
-class Record:
-    """What was sent and seen; it grows while the motion runs.
-
-    Attributes:
-        sent: the motion commands.
-        observations: where the table was seen.
-        corrections: where the stream was changed for drift.
-        failure: why the motion was stopped; None when it came to its end.
-        has_strayed: whether it was stopped because the table was not where it should be.
-    """
-
-    sent: list[Sent] = field(default_factory=list)
-    observations: list[Observation] = field(default_factory=list)
-    corrections: list[Correction] = field(default_factory=list)
-    failure: str | None = None
-    has_strayed: bool = False
-
-
 def execute(
     table: TableClient,
     motion: TableMotion,
@@ -141,11 +90,15 @@ def execute(
     run = _Run(table, motion, limits, wire, settings or Settings(), view, progress)
     try:
         run.go(commands)
-    except TableError as error:
+    except (TableError, PlannerError) as error:
         run.record.failure = str(error)
         run.record.has_strayed = isinstance(error, StrayedError | ArrivalTimeout)
     except KeyboardInterrupt:
         run.record.failure = "interrupted"
+    except BaseException:
+        with suppress(TableError):
+            table.stop()
+        raise
     if run.record.failure is not None:
         with suppress(TableError):
             table.stop()
@@ -217,7 +170,7 @@ class _Run:
             until_s = self._motion.end_s if following is None else self._prepare_s(following)
             self._observe(until_s)
         end_deg = self._running.command.target_deg if self._running else self._motion.start_deg
-        position_deg = self._table.wait_until_at(end_deg, self._settings.tolerance_deg, timeout_s=2.0)
+        position_deg = self._table.wait_until_at(end_deg, _AT_REST_DEG, timeout_s=3.0)
         self._see(Observation(self._now_s(), "H", position_deg))
 
     def _corrected(self, commands: Sequence[TimedCommand], number: int) -> Sequence[TimedCommand]:

@@ -13,9 +13,10 @@ from planner.run_file import RunConditions, StoredRun, copy_input, save_robot, s
 from planner.run_input import MAP_FILE, load_run_input
 from planner.run_plots import plot_run
 from planner.run_verification import DEFAULT_TOLERANCE_DEG, RunVerification, verify_run
-from planner.stream import Wire, check_it_fits, stream
+from planner.stream import check_it_fits, stream
 from planner.table_motion import PauseTimes, TableMotion
 from planner.table_port import open_port
+from planner.wire import Wire
 from protocol import TableClient
 
 

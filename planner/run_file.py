@@ -16,13 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planner.errors import PlannerError
-from planner.execute import Correction, Observation, Record, Sent
 from planner.robot_motion import RobotMotion
 from planner.run_input import MAP_FILE, RunInput, load_run_input
+from planner.run_record import Correction, Observation, Record, Sent
 from planner.run_verification import RunVerification
-from planner.stream import Wire
 from planner.table_motion import PauseTimes, Phase, TableMotion
 from planner.velocity_profile import MotionCommand
+from planner.wire import Wire
 
 _FORMAT = "seventh-axis run"
 _FORMAT_VERSION = 1

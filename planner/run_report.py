@@ -78,6 +78,8 @@ def _summary(run: StoredRun, checked: RunVerification) -> Iterator[tuple[str, st
     yield "margin left to a forbidden cell", f"{checked.margin_deg:.2f} deg"
     yield "latest command", f"{1000.0 * checked.latest_command_s:.1f} ms late"
     yield "locations without a trigger", f"{len(checked.missing_triggers)}"
+    if conditions.turns:
+        yield "full turns added to the plan", f"{conditions.turns}, to start where the table stood"
     yield "commands sent ahead by", f"{1000.0 * conditions.lead_s:g} ms"
     if run.record.sent:
         yield "if the line had died", f"at most {_longest_run_on_deg(run):.0f} deg until the table stood by itself"

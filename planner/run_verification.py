@@ -9,9 +9,9 @@ from planner.arrays import FloatArray
 from planner.config_map import ConfigurationMap
 from planner.cost import PathCost
 from planner.crossing import crossing_is_allowed
-from planner.execute import Observation, Record
 from planner.plan import path_cost
 from planner.run_input import RunInput
+from planner.run_record import Observation, Record
 from planner.table_motion import Phase, TableMotion
 
 DEFAULT_TOLERANCE_DEG = 0.25

@@ -10,7 +10,7 @@ import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.config_map import ConfigurationMap
 from planner.configuration import Configuration
 from planner.dynamic_programming import dynamic_programming
-from planner.execute import Record, Settings, bring_to, execute
+from planner.execute import Settings, bring_to, execute
 from planner.inside_view import view_of
 from planner.map_builder import build_maps
 from planner.map_problem import map_problem
@@ -18,12 +18,13 @@ from planner.motion import Limits
 from planner.plan import Plan
 from planner.problem import Problem
 from planner.run_input import RunInput
+from planner.run_record import Record
 from planner.run_verification import RunVerification, verify_run
 from planner.scan import load_scan
-from planner.stream import Wire
 from planner.synthetic_maps import MapFamily, synthetic_map
 from planner.table_motion import TableMotion
 from planner.table_port import open_port
+from planner.wire import Wire
 from protocol import TableClient
 
 
@@ -75,7 +76,7 @@ def random_run_inputs(count: int, margin: int = 1, step_s: float = 0.1) -> Itera
     """
     seed = 0
     while count:
-        family = MapFamily(forbidden=0.15 + 0.05 * (seed % 4), slope=(0.0, 0.4, -0.8)[seed % 3], angle_count=360,
+        family = MapFamily(forbidden=0.35 + 0.05 * (seed % 5), slope=(0.0, 0.4, -0.8)[seed % 3], angle_count=360,
                            obstacle_size=8.0)  # fmt: skip
         configuration_map = synthetic_map(family, seed)
         problem = Problem(configuration_map, step_s)

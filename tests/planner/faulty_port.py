@@ -1,7 +1,7 @@
 """A port onto a simulated table that goes wrong at a chosen moment."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 from planner.table_port import open_port
 from protocol import Clock
@@ -28,7 +28,7 @@ class FaultyPort:
     """
 
     def __init__(self, fault: Fault | None = None, fault_s: float = 0.0, faults: int = 1_000_000) -> None:
-        self._port: Any = open_port("emulator://", 9600, 0.5)
+        self._port = cast("Any", open_port("emulator://", 9600, 0.5))
         self._fault, self._fault_s, self._faults = fault, fault_s, faults
         self.table: Any = self._port.table
         self.clock: Clock = self._port.clock

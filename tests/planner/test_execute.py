@@ -7,13 +7,14 @@ import pytest
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.cost import PathCost
-from planner.execute import ExecutionError, Record, Settings, bring_to, execute
+from planner.execute import ExecutionError, Settings, bring_to, execute
 from planner.inside_view import PortView
 from planner.motion import Limits, roll_out
 from planner.plan import Plan
-from planner.stream import Wire
+from planner.run_record import Record
 from planner.table_motion import Phase, TableMotion
 from planner.table_port import ScaledClock
+from planner.wire import Wire
 from protocol import TableClient
 from tests.planner.faulty_port import FaultyPort, hang_up, lose
 from tests.planner.run_examples import paused_run_input, short_run_input
@@ -113,6 +114,14 @@ def test_a_table_whose_line_died_comes_to_rest_by_itself() -> None:
     run(motion_at(10.0, 4.0), port)
     port.table.advance(10_000)
     assert port.table.status().state == "idle"
+
+
+def test_an_error_reply_stops_the_table() -> None:
+    port = FaultyPort(lambda _: b"ERR 5 bad byte\r", fault_s=2.0, faults=1)
+    record = run(motion_at(10.0, 4.0), port)
+    assert record.failure is not None
+    assert "got ERR 5 bad byte" in record.failure
+    assert stands(port)
 
 
 @pytest.mark.parametrize("faults", [1, 1_000_000])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from planner.execute import Observation, Record
 from planner.run_input import RunInput
+from planner.run_record import Observation, Record
 from planner.run_verification import RunVerification, verify_run
 from planner.table_motion import TableMotion
 from tests.planner.run_examples import short_run_input

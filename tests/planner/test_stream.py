@@ -11,9 +11,10 @@ from planner.arrays import FloatArray
 from planner.cost import PathCost
 from planner.motion import Limits, roll_out
 from planner.plan import Plan
-from planner.stream import StreamError, TimedCommand, Wire, check_it_fits, reference_states, rounded_stream, stream
+from planner.stream import TimedCommand, check_it_fits, reference_states, rounded_stream, stream
 from planner.table_motion import TableMotion
 from planner.velocity_profile import advance
+from planner.wire import StreamError, Wire
 from tests.planner.run_examples import paused_run_input
 from tools.bench_stream import random_plan
 

@@ -1,0 +1,36 @@
+"""A small share of what the benchmark measures, as tests."""
+
+import numpy as np
+import pytest
+
+from planner.execute import Settings
+from planner.motion import Limits
+from planner.stream import rounded_stream, stream
+from tools.bench_stream import LEAD_S, errors_at_locations, random_plan
+from tools.virtual_run import random_run_inputs, run_in_virtual_time
+
+
+def test_a_random_plan_keeps_the_limits() -> None:
+    limits = Limits(30.0, 50.0)
+    plan = random_plan(np.random.default_rng(0), 0.1, 20.0, limits)
+    assert np.abs(plan.speeds_deg_s).max() <= limits.speed_deg_s + 1e-9
+    assert np.abs(plan.accelerations_deg_s2).max() <= limits.acceleration_deg_s2 + 1e-9
+
+
+@pytest.mark.parametrize("step_s", [0.1, 1.0])
+def test_feeding_errors_back_beats_rounding_each_on_its_own(step_s: float) -> None:
+    limits = Limits()
+    plan = random_plan(np.random.default_rng(1), step_s, 60.0, limits)
+    fed_back, rounded = (
+        np.abs(errors_at_locations(plan, limits, streamed)).max() for streamed in (stream, rounded_stream)
+    )
+    assert fed_back < 0.004 if step_s == 0.1 else fed_back < 0.04
+    assert rounded > 5.0 * fed_back
+
+
+def test_no_random_plan_touches_a_forbidden_cell() -> None:
+    for run_input in random_run_inputs(8):
+        run = run_in_virtual_time(run_input, settings=Settings(lead_s=LEAD_S))
+        assert run.checked.is_verified, f"{run_input.name}: {run.checked.verdict}"
+        assert run.checked.worst_deg < 0.1
+        assert run.checked.latest_command_s <= 0.001
