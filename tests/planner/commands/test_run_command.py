@@ -3,6 +3,8 @@
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,17 @@ import pytest
 
 from planner.__main__ import main
 from tests.planner.run_examples import LOCATIONS, write_short_scan
+
+
+@contextmanager
+def running(command: list[str]) -> Iterator[str]:
+    """Run a program, yield its first line, and end it."""
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        assert process.stdout is not None
+        try:
+            yield process.stdout.readline().strip()
+        finally:
+            process.terminate()
 
 
 @pytest.fixture
@@ -83,11 +96,8 @@ def test_a_port_without_a_table_is_one_sentence(
 
 
 def test_a_silent_port_is_one_sentence(plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with subprocess.Popen([sys.executable, "-c", SILENT_SERVER], stdout=subprocess.PIPE, text=True) as server:
-        assert server.stdout is not None
-        port = f"socket://127.0.0.1:{server.stdout.readline().strip()}"
-        assert run(plan_file, tmp_path / "run", port, "--timeout", "0.1") == 2
-        server.terminate()
+    with running([sys.executable, "-c", SILENT_SERVER]) as port:
+        assert run(plan_file, tmp_path / "run", f"socket://127.0.0.1:{port}", "--timeout", "0.1") == 2
     assert "no reply" in capsys.readouterr().err
 
 
@@ -121,11 +131,9 @@ def test_a_real_port_gets_the_same_commands_and_the_same_verdict(plan_file: Path
     control = tmp_path / "control"
     listen = [where] if where == "--pty" else [where, "0"]
     command = [sys.executable, "-m", "emulator", *listen, "--control", str(control)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as stand_in:
-        assert stand_in.stdout is not None
-        port = stand_in.stdout.readline().strip()
-        assert run(plan_file, tmp_path / "real", port, "--control", str(control), "--tolerance", "0.5") == 0
-        stand_in.terminate()
+    with running(command) as port:
+        status = run(plan_file, tmp_path / "real", port, "--control", str(control), "--tolerance", "0.5")
+    assert status == 0
     assert run(plan_file, tmp_path / "virtual") == 0
     real, virtual = (result_in(tmp_path / name) for name in ("real", "virtual"))
     assert [each["command"] for each in real["commands"]] == [each["command"] for each in virtual["commands"]]
