@@ -235,7 +235,7 @@ class RandomWalk(RuleBasedStateMachine):
         resting = float(self.rig.wait_for_rest())
         last = self.rig.motion.expectations[-1]
         allowed = self.rig.profile.tolerance.rest_deg + self.rig.profile.resolution_deg / 2
-        allowed += abs(last.motion.start_speed_deg_s) * last.uncertainty_s
+        allowed += last.open_at_rest_deg
         error = resting - last.motion.target_deg
         require(abs(error) <= allowed, f"at rest {error:.3g} deg from the target, allowed {allowed:.3g}")
         # Whatever the time of an increment left open is known now.

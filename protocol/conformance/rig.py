@@ -33,11 +33,16 @@ class Sample(NamedTuple):
 
 
 class Expectation(NamedTuple):
-    """A commanded motion, and the middle and the half width of the time at which it began."""
+    """A commanded motion, the middle and the half width of the time at which it began, and what that leaves open.
+
+    In motion, the moment of an increment is also its place: on the way and at rest the table may be off by so much.
+    """
 
     began_s: float
     uncertainty_s: float
     motion: Motion
+    open_on_the_way_deg: float = 0.0
+    open_at_rest_deg: float = 0.0
 
     def at(self, time_s: float) -> tuple[float, float]:
         """Return where the reference should be, and at what speed."""
@@ -173,21 +178,26 @@ class Rig:
 
     def stand_at(self, angle_deg: float) -> None:
         """Take it that the reference rests at an angle."""
-        self._expect_motion(Motion(angle_deg, 0.0, angle_deg, ()), self.wire.clock.now_s(), 0.0)
+        resting = Motion(angle_deg, 0.0, angle_deg, ())
+        self.motion.expectations.append(Expectation(self.wire.clock.now_s(), 0.0, resting))
 
     def move_to(self, angle_deg: float) -> None:
         """Command P, relative to home."""
         target = self.home_deg + angle_deg
         began_s, uncertainty_s = self._timed(b"P %s" % number(target))
         position, speed = self.reference_at(began_s)
-        self._expect_motion(plan(position, speed, target, self.top_deg_s, self.rate_deg_s2), began_s, uncertainty_s)
+        window_s, open_deg = self._left_open(speed, uncertainty_s)
+        motion = plan(position, speed, target, self.top_deg_s, self.rate_deg_s2)
+        self.motion.expectations.append(Expectation(began_s, window_s, motion, open_deg))
 
     def move_by(self, angle_deg: float) -> None:
         """Command R."""
         began_s, uncertainty_s = self._timed(b"R %s" % number(angle_deg))
         position, speed = self.reference_at(began_s)
-        target = position + angle_deg
-        self._expect_motion(plan(position, speed, target, self.top_deg_s, self.rate_deg_s2), began_s, uncertainty_s)
+        window_s, open_deg = self._left_open(speed, uncertainty_s)
+        open_deg += abs(speed) * window_s
+        motion = plan(position, speed, position + angle_deg, self.top_deg_s, self.rate_deg_s2)
+        self.motion.expectations.append(Expectation(began_s, window_s, motion, open_deg, open_deg))
 
     def reference_at(self, time_s: float) -> tuple[float, float]:
         """Return where the reference should be at a time, and its speed."""
@@ -233,9 +243,7 @@ class Rig:
     def check_rest(self, name: str) -> None:
         """Measure where the table stands, from the target."""
         last = self.motion.expectations[-1]
-        # The target of an R in motion is as uncertain as the moment at which it was carried out.
-        open_deg = abs(last.motion.start_speed_deg_s) * last.uncertainty_s
-        allowed = self.profile.tolerance.rest_deg + self.profile.resolution_deg / 2 + open_deg
+        allowed = self.profile.tolerance.rest_deg + self.profile.resolution_deg / 2 + last.open_at_rest_deg
         error = float(self.read()) - last.motion.target_deg
         self.measure(f"{name}: from the target", error, "deg", -allowed, allowed)
 
@@ -269,8 +277,12 @@ class Rig:
         latest_s = max(reply.first_s - self.profile.byte_s, earliest_s)
         return (earliest_s + latest_s) / 2, (latest_s - earliest_s) / 2 + self._jitter_s
 
-    def _expect_motion(self, motion: Motion, began_s: float, uncertainty_s: float) -> None:
-        self.motion.expectations.append(Expectation(began_s, uncertainty_s, motion))
+    def _left_open(self, speed_deg_s: float, uncertainty_s: float) -> tuple[float, float]:
+        """Return what the motions before a command, and its own time, leave open of the reference: time and angle."""
+        before = self.motion.expectations[-1]
+        if speed_deg_s == 0.0:
+            return uncertainty_s, before.open_at_rest_deg
+        return uncertainty_s + before.uncertainty_s, before.open_on_the_way_deg
 
     def excess(self, sample: Sample) -> float:
         """Return how far a sample is from where the reference can have been, with all times as they may have been."""
@@ -280,7 +292,7 @@ class Rig:
             self.reference_at(sample.time_s + offset_s)[0]
             for offset_s in (-window_s, -window_s / 2, 0.0, window_s / 2, window_s)
         ]
-        half_deg = self.profile.resolution_deg / 2
+        half_deg = self.profile.resolution_deg / 2 + sum(one.open_on_the_way_deg for one in running[-1:])
         low, high = min(positions) - half_deg, max(positions) + half_deg
         return max(low - sample.position_deg, sample.position_deg - high, 0.0)
 
