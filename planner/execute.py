@@ -17,7 +17,7 @@ from planner.run_record import Correction, Observation, Record, Sent
 from planner.stream import TimedCommand, check_it_fits, stream
 from planner.table_motion import TableMotion
 from planner.velocity_profile import MotionCommand, ReferenceState, advance, time_to_rest_s
-from planner.wire import Wire, command_line, exchanges_s
+from planner.wire import Grid, Wire, command_line, exchanges_s
 from protocol import ArrivalTimeout, CommandRefused, TableClient, TableError, Verb
 
 # What the bytes of H and of its answer come to.
@@ -88,53 +88,47 @@ def execute(
     commands = stream(motion, limits, wire)
     check_it_fits(commands, wire)
     run = _Run(table, motion, limits, wire, settings or Settings(), view, progress)
+    is_done = False
     try:
         run.go(commands)
+        is_done = True
     except (TableError, PlannerError) as error:
         run.record.failure = str(error)
         run.record.has_strayed = isinstance(error, StrayedError | ArrivalTimeout)
     except KeyboardInterrupt:
         run.record.failure = "interrupted"
-    except BaseException:
-        with suppress(TableError):
-            table.stop()
-        raise
-    if run.record.failure is not None:
-        with suppress(TableError):
-            table.stop()
+    finally:
+        if not is_done:
+            with suppress(TableError):
+                table.stop()
+        if progress is not None:
+            progress(1, 1)
     return run.record
 
 
 def bring_to(table: TableClient, angle_deg: float, limits: Limits, wire: Wire, tolerance_deg: float = 0.1) -> None:
-    """Move the table to an angle at the limits, unless it stands there, and wait until it does.
+    """Move the table to an angle at the limits, and wait until it stands there.
 
     Raises:
         TableError: the table did not get there; it was stopped.
     """
-    position_deg = table.position_deg()
+    way = Grid(limits, wire).command(MotionCommand(angle_deg, *limits))
+    needed_s = time_to_rest_s(ReferenceState(table.position_deg(), 0.0), way)
     try:
-        table.set_speed(_floor(limits.speed_deg_s, wire))
-        table.set_acceleration(_floor(limits.acceleration_deg_s2, wire))
+        table.set_speed(way.speed_deg_s)
+        table.set_acceleration(way.acceleration_deg_s2)
     except CommandRefused as error:
         raise ExecutionError(
             f"this table refuses the plan's limits, {limits.speed_deg_s:g} deg/s and"
             f" {limits.acceleration_deg_s2:g} deg/s2; plan within this table's own limits"
         ) from error
-    if abs(position_deg - angle_deg) <= tolerance_deg:
-        return
-    way = MotionCommand(angle_deg, *limits)
     try:
-        table.move_to(angle_deg)
-        needed_s = time_to_rest_s(ReferenceState(position_deg, 0.0), way)
-        table.wait_until_at(angle_deg, tolerance_deg, 2.0 * needed_s + 3.0)
+        table.move_to(way.target_deg)
+        table.wait_until_at(way.target_deg, tolerance_deg, 2.0 * needed_s + 3.0)
     except (TableError, KeyboardInterrupt):
         with suppress(TableError):
             table.stop()
         raise
-
-
-def _floor(limit: float, wire: Wire) -> float:
-    return int(limit / wire.quantum + 1e-6) * wire.quantum
 
 
 class _Run:
@@ -192,7 +186,8 @@ class _Run:
         if before is None or command.speed_deg_s != before.speed_deg_s:
             self._table.set_speed(command.speed_deg_s)
         self._latched = command
-        under_way_s = self._wire.seconds(self._target_bytes(command)) + self._wire.latency_s
+        line = command_line(Verb.MOVE_TO, command.target_deg, self._wire)
+        under_way_s = self._wire.seconds(len(line)) + self._wire.latency_s
         due_s = timed.time_s - self._settings.lead_s - under_way_s
         self._sleep_until(due_s)
         late_s = self._now_s() - due_s
@@ -209,9 +204,6 @@ class _Run:
         """Return when the lines of a command have to begin."""
         needed_s = exchanges_s(self._wire, timed.command, self._latched) + self._wire.latency_s + _SLACK_S
         return timed.time_s - self._settings.lead_s - needed_s
-
-    def _target_bytes(self, command: MotionCommand) -> int:
-        return len(command_line(Verb.MOVE_TO, command.target_deg, self._wire))
 
     def _observe(self, until_s: float) -> None:
         """Read latch and position, as often as there is time for it; then sleep."""
@@ -232,9 +224,10 @@ class _Run:
 
     def _latch(self) -> None:
         """Pull the trigger where it is ours to pull, and read the latch."""
-        column, _ = self._pending_columns.pop(0)
-        time_s = self._now_s()
+        column, column_s = self._pending_columns.pop(0)
+        time_s = float(column_s)  # a real probe pulled it then
         if self._view is not None:
+            time_s = self._now_s()
             self._view.trigger()
             self._look(column)
         self._see(Observation(time_s, "L", self._table.latched_deg(), column))

@@ -68,7 +68,7 @@ def run_plan(
             turns = turns_to_start(run_input.problem.map, position_deg, motion.start_deg)
         run_input = run_input.turned(turns)
         motion = TableMotion(run_input.plan, limits, options.pause_times)
-        bring_to(table, round(motion.start_deg, options.decimals), limits, wire)
+        bring_to(table, motion.start_deg, limits, wire)
         settings = Settings(lead_s=options.lead_s)
         record = execute(table, motion, limits, wire, settings, view, progress)
     conditions = RunConditions(options.port, wire, options.lead_s, options.tolerance_deg, turns, options.pause_times)

@@ -47,7 +47,7 @@ def run_in_virtual_time(
     begin_s = time.perf_counter()
     port = open_port(url, wire.baud, timeout_s=0.5)
     with TableClient(port, timeout_s=0.5, decimals=wire.decimals) as table:
-        bring_to(table, round(motion.start_deg, wire.decimals), limits, wire)
+        bring_to(table, motion.start_deg, limits, wire)
         record = execute(table, motion, limits, wire, settings, view_of(port))
         simulated_s = table.clock.now_s()
     real_s = time.perf_counter() - begin_s

@@ -36,7 +36,7 @@ def run(
     motion: TableMotion, port: FaultyPort, settings: Settings | None = None, progress: Progress | None = None
 ) -> Record:
     table = TableClient(port, timeout_s=0.5)
-    bring_to(table, round(motion.start_deg, 1), LIMITS, WIRE)
+    bring_to(table, motion.start_deg, LIMITS, WIRE)
     return execute(table, motion, LIMITS, WIRE, settings, PortView(port.table), progress)
 
 
