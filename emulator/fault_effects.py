@@ -44,7 +44,12 @@ class Active(NamedTuple):
 
 
 class Faults:
-    """The faults of one table: those to come, and those that hold."""
+    """The faults of one table: those to come, and those that hold.
+
+    Attributes:
+        present: whether there is any, or bytes are held back; while there is none a table need not ask.
+        lines_heard: commands that the table has heard.
+    """
 
     def __init__(self, config: TableConfig, seed: int) -> None:
         """Take the faults of a configuration; one without a beginning holds from the start."""
@@ -55,23 +60,26 @@ class Faults:
         self._plans: list[Plan] = []
         self._active: dict[str, Active] = {}
         self._held: deque[tuple[int, bytes]] = deque()
-        self._lines = 0
+        self.present = False
+        self.lines_heard = 0
         self._bounce_end_tick = 0
         for fault in config.faults:
             self.inject(fault, 0)
 
     def inject(self, fault: Fault, tick: int) -> None:
         """Add a fault, which replaces one of its kind that holds, from its beginning or else from now on."""
-        begin = None if fault.at_s is None else max(round(fault.at_s * self._tick_hz), tick)
+        begin = None if fault.at_command is not None else tick
+        if fault.at_s is not None:
+            begin = max(round(fault.at_s * self._tick_hz), tick)
         ticks = None if fault.for_s is None else max(1, round(fault.for_s * self._tick_hz))
-        plan = Plan(fault, begin if fault.at_s is not None or fault.at_command is not None else tick, ticks)
-        self._plans.append(plan)
+        self._plans.append(Plan(fault, begin, ticks))
         self.begin_tick(tick)
 
     def clear(self) -> None:
         """End all faults, and forget those to come."""
         self._plans.clear()
         self._active.clear()
+        self.present = bool(self._held)
 
     @property
     def turns_the_drive(self) -> bool:
@@ -86,7 +94,7 @@ class Faults:
     @property
     def next_tick(self) -> int | None:
         """The tick at which a fault begins or ends, or held bytes are due; None where nothing is to come."""
-        if not (self._plans or self._active or self._held):
+        if not self.present:
             return None
         ticks = [plan.begin_tick for plan in self._plans] + [one.end_tick for one in self._active.values()]
         ticks += [self.held_until]
@@ -102,11 +110,11 @@ class Faults:
         for name in [name for name, one in self._active.items() if one.end_tick is not None and one.end_tick <= tick]:
             del self._active[name]
         self._begin([plan for plan in self._plans if plan.begin_tick is not None and plan.begin_tick <= tick], tick)
+        self.present = bool(self._plans or self._active or self._held)
 
-    def hear_line(self, tick: int) -> None:
-        """Count a command, and begin the faults that wait for it."""
-        self._lines += 1
-        self._begin([plan for plan in self._plans if plan.fault.at_command == self._lines], tick)
+    def begin_line(self, tick: int) -> None:
+        """Begin the faults that wait for the command that was heard last."""
+        self._begin([plan for plan in self._plans if plan.fault.at_command == self.lines_heard], tick)
 
     # On the line
 

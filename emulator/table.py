@@ -75,7 +75,8 @@ class Table:
 
     def receive(self, data: bytes) -> None:
         """Take bytes that the client puts on the line now."""
-        data = self._faults.on_the_line(data, TO_TABLE)
+        if self._faults.present:
+            data = self._faults.on_the_line(data, TO_TABLE)
         if self.config.serial.baud:
             self._uart.receive(data)
         else:
@@ -131,7 +132,7 @@ class Table:
                     self._advance_watched()
                 else:
                     self._advance_undisturbed(event)
-        if self._faults.next_tick is not None:
+        if self._faults.present:
             self._serve_faults()
 
     @property
@@ -239,7 +240,7 @@ class Table:
     def _advance_watched(self) -> None:
         """Pass one tick in which the line, an edge, a fault or the observer has its turn."""
         faults, before = self._faults, self._state
-        if faults.next_tick is not None:
+        if faults.present:
             self._serve_faults()
         if faults.turns_the_drive:
             self._constants, self._state = faults.step(self._constants, before, self._load_torque_Nm)
@@ -298,10 +299,14 @@ class Table:
     def _interpret(self, data: bytes) -> None:
         self._heard += data if self.observer else b""
         for line in self._lines.feed(data):
-            with self._faults_beginning():
-                self._faults.hear_line(self.tick)
+            self._faults.lines_heard += 1
+            if self._faults.present:
+                with self._faults_beginning():
+                    self._faults.begin_line(self.tick)
             reply = self._reply(line if isinstance(line, ErrorCode) else decode_command(line))
-            self._put(self._faults.on_a_reply(reply, self.tick))
+            if self._faults.present:
+                reply = self._faults.on_a_reply(reply, self.tick)
+            self._put(reply)
 
     def _put(self, reply: bytes) -> None:
         """Give a reply to the line."""
@@ -324,7 +329,8 @@ class Table:
         return b"" if serial.strict and isinstance(reply, Refusal) else encode_reply(reply, serial.decimals)
 
     def _send(self, data: bytes) -> None:
-        data = self._faults.on_the_line(data, TO_CLIENT)
+        if self._faults.present:
+            data = self._faults.on_the_line(data, TO_CLIENT)
         self._replies += data
         self._said += data if self.observer else b""
 
