@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
+import numpy as np
+
 from planner.closest_command import LATEST_S
 from planner.errors import PlannerError
 from planner.inside_view import InsideView
@@ -24,6 +26,8 @@ from protocol import ArrivalTimeout, CommandRefused, TableClient, TableError, Ve
 _READING_BYTES = 12
 # A table at rest is within this of its target: 0.05 deg, and the rounding of its answer.
 _AT_REST_DEG = 0.15
+# What took longer than this has no certain time: the operating system was busy elsewhere.
+_CERTAIN_S = 0.01
 # Between the last poll and the next command: what the operating system may take.
 _SLACK_S = 0.005
 
@@ -237,19 +241,27 @@ class _Run:
         self._next_poll_s = self._now_s() + self._settings.poll_s
         time_s = self._now_s() + self._wire.seconds(2)
         position_deg = self._table.position_deg()
-        self._see(Observation(time_s, "H", position_deg))
-        planned_deg = self._motion.state_at(time_s).angle_deg
-        if abs(position_deg - planned_deg) > self._settings.tolerance_deg:
-            raise StrayedError(
-                f"at {time_s:.2f} s the table is at {position_deg:.1f} deg and should be at {planned_deg:.1f}, more"
-                f" than {self._settings.tolerance_deg:g} deg off; does it turn freely?"
-            )
-        # Where the reference was a lag ago: there the encoder is now.
+        # The table looked at its encoder at some time from here to there: mostly here, when the answer is in time.
+        latest_s = self._now_s() - self._wire.seconds(_READING_BYTES - 2)
+        is_certain = latest_s - time_s < _CERTAIN_S
+        self._see(Observation(time_s, "H" if is_certain else "H late", position_deg))
+        self._check(position_deg, time_s, max(time_s, latest_s))
         assert self._running is not None
+        # Where the reference was a lag ago, there the encoder is now.
         since_s = time_s + self._settings.lead_s - self._settings.lag_s - self._running.time_s
-        if since_s >= 0.0:
+        if is_certain and since_s >= 0.0:
             expected = advance(self._running.expected, self._running.command, since_s)
             self._drift.take(time_s, position_deg - expected.angle_deg)
+
+    def _check(self, position_deg: float, earliest_s: float, latest_s: float) -> None:
+        """Stop the run where the position is not what the plan has from one time to another."""
+        planned_deg = [self._motion.state_at(time_s).angle_deg for time_s in np.linspace(earliest_s, latest_s, 5)]
+        off_deg = max(min(planned_deg) - position_deg, position_deg - max(planned_deg))
+        if off_deg > self._settings.tolerance_deg:
+            raise StrayedError(
+                f"at {earliest_s:.2f} s the table is at {position_deg:.1f} deg and should be at {planned_deg[0]:.1f}, more"
+                f" than {self._settings.tolerance_deg:g} deg off; does it turn freely?"
+            )
 
     def _see(self, observation: Observation) -> None:
         self.record.observations.append(observation)
@@ -258,11 +270,15 @@ class _Run:
 
     def _look(self, column: int | None = None) -> None:
         assert self._view is not None
+        begin_s = self._now_s()
         look = self._view.look()
-        self.record.observations.append(
-            Observation(self._now_s(), "inside", look.encoder_deg, column, look.reference_deg, look.true_deg)
-        )
-        self._next_look_s = self._now_s() + self._settings.look_s
+        end_s = self._now_s()
+        self._next_look_s = end_s + self._settings.look_s
+        if column is not None or end_s - begin_s < _CERTAIN_S:
+            time_s = 0.5 * (begin_s + end_s)
+            self.record.observations.append(
+                Observation(time_s, "inside", look.encoder_deg, column, look.reference_deg, look.true_deg)
+            )
 
     def _now_s(self) -> float:
         return self._table.clock.now_s() - self._origin_s

@@ -26,7 +26,7 @@ class RunOptions(NamedTuple):
     port: str
     baud: int = 9600
     decimals: int = 1
-    timeout_s: float = 0.5
+    timeout_s: float = 1.0
     lead_s: float = Settings().lead_s
     tolerance_deg: float = DEFAULT_TOLERANCE_DEG
     control: Path | None = None
@@ -59,7 +59,8 @@ def run_plan(
     copy_input(out, plan_file, map_file)
     with ExitStack() as stack:
         port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
-        table = stack.enter_context(TableClient(port, options.timeout_s, options.decimals))
+        timeout_s = options.timeout_s * options.time_scale
+        table = stack.enter_context(TableClient(port, timeout_s, options.decimals))
         view = _view(options.control, port, stack)
         position_deg = table.position_deg()
         if options.arm_is_away:

@@ -22,7 +22,8 @@ class Observation(NamedTuple):
 
     Attributes:
         time_s: when, in the time of the motion.
-        source: "H", "L", or "inside" for a look that a stand-in allowed.
+        source: "H", "L", or "inside" for a look that a stand-in allowed; "H late" when the answer came so late that
+            the time is uncertain.
         encoder_deg: the encoder, as `source` tells it.
         column: the scan location whose trigger this belongs to.
         reference_deg: the controller's reference, where it was told.

@@ -36,7 +36,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument("--baud", type=int, default=9600, metavar="N", help="default 9600")
     parser.add_argument("--decimals", type=int, default=1, metavar="N", help="places after the point (default 1)")
     parser.add_argument(
-        "--timeout", type=float, default=0.5, metavar="S", help="wait this long for a reply (default 0.5)"
+        "--timeout", type=float, default=1.0, metavar="S", help="wait this long for a reply (default 1)"
     )
     parser.add_argument(
         "--lead", type=float, default=Settings().lead_s, metavar="S",
