@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from planner.commands import map as map_command
 from planner.commands import plan as plan_command
 from planner.commands import run as run_command
+from planner.commands import scan as scan_command
 from planner.commands import show as show_command
 from planner.errors import PlannerError
 
@@ -25,6 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     map_command.add_parser(commands)
     plan_command.add_parser(commands)
     run_command.add_parser(commands)
+    scan_command.add_parser(commands)
     show_command.add_parser(commands)
     chosen = parser.parse_args(arguments)
     try:

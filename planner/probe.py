@@ -77,6 +77,7 @@ class Profiles(NamedTuple):
         profiles: `(m,)` which of the poses each point was measured from.
         points_S: `(m, 3)` where the probe says that it is, in frame S.
         rays_S: `(m, 3)` directions of the laser's rays in frame S.
+        noise_mm: `(m,)` by how much it is too far along its ray.
         true_W: `(m, 3)` where it truly is, in the frame that the poses are in.
         normals_W: `(m, 3)` outward normals of the surface there.
     """
@@ -84,6 +85,7 @@ class Profiles(NamedTuple):
     profiles: npt.NDArray[np.int64]
     points_S: FloatArray
     rays_S: FloatArray
+    noise_mm: FloatArray
     true_W: FloatArray
     normals_W: FloatArray
 
@@ -119,9 +121,10 @@ def measure(
 
     struck, profile, place = struck[seen], profile[seen], place[seen]
     noise_mm = np.stack([_noise(probe, seed, int(number)) for number in numbers]) if len(numbers) else np.zeros((0, 1))
-    measured_mm = hits.distances_mm[struck] + noise_mm[profile, place]
+    error_mm = noise_mm[profile, place]
+    measured_mm = hits.distances_mm[struck] + error_mm
     rays = rays_S[place]
-    return Profiles(profile, measured_mm[:, np.newaxis] * rays, rays, points[seen], normals[seen])
+    return Profiles(profile, measured_mm[:, np.newaxis] * rays, rays, error_mm, points[seen], normals[seen])
 
 
 def sight(

@@ -1,0 +1,143 @@
+"""`python -m planner scan`: carry a scan out with a simulated probe, and account for the error of its cloud."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from planner.errors import PlannerError
+from planner.latched_run import TriggerConditions
+from planner.progress import progress_line
+from planner.scan import load_scan, shipped_scans
+from planner.scan_file import save_scan, scan_document
+from planner.scan_report import scan_report, verdict_of
+from planner.scan_run import Scanned, ScanOptions, scan_workpiece, with_mesh
+from planner.whole_file import whole_file
+from protocol import TableError
+
+_INCOMPLETE = 1
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command to `python -m planner`."""
+    parser = commands.add_parser(
+        "scan",
+        help="scan a workpiece with a simulated probe, and account for the cloud's error",
+        description="Plan a scan, move the table, take laser profiles and align them to one cloud; exit status 1 when"
+        " it ended early.",
+        epilog="example: python -m planner scan cylinder --decimals 3 --out build/cylinder",
+    )
+    parser.add_argument("scan", metavar="SCAN", help=f"a scan file, or one of {', '.join(shipped_scans())}")
+    parser.add_argument("--mesh", type=Path, metavar="FILE", help="another workpiece in the place of the scan's")
+    parser.add_argument(
+        "--port", metavar="URL", default="emulator://",
+        help="emulator:// for a table in simulated time (the default), or a stand-in's port along with --control",
+    )  # fmt: skip
+    parser.add_argument("--control", type=Path, metavar="PATH", help="the control channel of a stand-in at --port")
+    parser.add_argument("--baud", type=_whole(0, 1_000_000), default=9600, metavar="N", help="default 9600")
+    parser.add_argument(
+        "--decimals", type=_whole(0, 6), default=1, metavar="N", help="places after the point on the wire (default 1)"
+    )
+    parser.add_argument(
+        "--rate", type=_rate, default=TriggerConditions().rate_hz, metavar="HZ",
+        help="profiles a second (default %(default)g)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--configuration", metavar="NAME", default="best", help="such as LEFTY-ABOVE-NOFLIP, or best (the default)"
+    )
+    parser.add_argument(
+        "--exact-calibration", action="store_true", help="align with the true placements instead of calibrated ones"
+    )
+    parser.add_argument("--xyz", action="store_true", help="write cloud.xyz as well")
+    parser.add_argument("--seed", type=_whole(0, 2**31), default=0, metavar="N", help="chooses all noise (default 0)")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="folder for cloud.ply, scan.json and report.html"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Scan, write cloud, figures and report, print what it came to, and return the exit status."""
+    scan = load_scan(arguments.scan)
+    if arguments.mesh is not None:
+        scan = with_mesh(scan, arguments.mesh)
+    options = ScanOptions(
+        port=_port(arguments.port, arguments.decimals, arguments.seed),
+        baud=arguments.baud,
+        decimals=arguments.decimals,
+        control=arguments.control,
+        configuration=arguments.configuration,
+        exact_calibration=arguments.exact_calibration,
+        xyz=arguments.xyz,
+        triggers=TriggerConditions(rate_hz=arguments.rate, seed=arguments.seed),
+        seed=arguments.seed,
+    )
+    out: Path = arguments.out
+    try:
+        scanned = scan_workpiece(scan, options, out, lambda label: progress_line(label, sys.stderr))
+        save_scan(out / "scan.json", scan_document(scanned))
+        with whole_file(out / "report.html") as partial:
+            partial.write_text(scan_report(scanned), encoding="utf-8")
+    except TableError as error:
+        raise PlannerError(str(error)) from error
+    except OSError as error:
+        raise PlannerError(f"{out}: the scan cannot be written there ({error.strerror or error})") from error
+    sys.stdout.write(summary(scanned))
+    return 0 if scanned.is_whole else _INCOMPLETE
+
+
+def summary(scanned: Scanned) -> str:
+    """Return what a scan came to, for people."""
+    run, accounted = scanned.run, scanned.account
+    mean, sigma, within, greatest = (f"{1e3 * value:.1f}" for value in accounted.distances)
+    shares = [
+        (
+            str(part),
+            f"{1e3 * share.displacement_mm:.2f}",
+            f"{1e3 * share.across_mm:.2f}",
+            f"{1e3 * share.without_mm:.2f}",
+        )
+        for part, share in accounted.parts.items()
+    ]
+    total = accounted.total
+    shares.append(("all together", f"{1e3 * total.displacement_mm:.2f}", f"{1e3 * total.across_mm:.2f}", ""))
+    shares.append(("all switched off", f"{1e3 * accounted.none_mm:.1g}", "", ""))
+    lines = [
+        f"{scanned.scan.name}: {verdict_of(scanned)}",
+        f"profiles   {run.triggers} taken, {len(run.dropped)} dropped because a latch was missing",
+        f"distance   mean {mean}, sigma {sigma}, 95 % within {within}, greatest {greatest} micrometres",
+        f"{'rms, in micrometres':24} {'displacement':>12} {'across':>8} {'without':>8}",
+        *(f"  {name:22} {alone:>12} {across:>8} {without:>8}".rstrip() for name, alone, across, without in shares),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _port(url: str, decimals: int, seed: int) -> str:
+    """Return the URL; a table that is made for this scan gets the scan's decimals and seed, unless told others."""
+    if not url.startswith("emulator://"):
+        return url
+    told = url.partition("?")[2]
+    wanted = [f"{key}={value}" for key, value in (("decimals", decimals), ("seed", seed)) if f"{key}=" not in told]
+    return "emulator://?" + "&".join(([told] if told else []) + wanted)
+
+
+def _whole(least: int, most: int) -> "type[int]":
+    def number(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = least - 1
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"is {text}; allowed is a whole number from {least} to {most}")
+        return value
+
+    return number  # type: ignore[return-value] # argparse takes any function
+
+
+def _rate(text: str) -> float:
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = 0.0
+    if not 0.0 < rate <= 1000.0:
+        raise argparse.ArgumentTypeError(f"is {text}; allowed is a number above 0 and at most 1000")
+    return rate

@@ -1,0 +1,94 @@
+"""Point clouds on disk, written as they come: PLY (binary) and XYZ (text). A file appears when it is closed."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from planner.arrays import FloatArray
+from planner.whole_file import whole_file
+
+# A vertex as it lies in the file. Single precision leaves 0.03 micrometres at 500 mm.
+_COORDINATES = ("x", "y", "z", "beam_x", "beam_y", "beam_z")
+_VERTEX = np.dtype([*((name, "<f4") for name in _COORDINATES), ("profile", "<u4")])
+
+
+class PlyWriter:
+    """A binary PLY file of points (mm), each with the direction in which the laser met it and its profile's number.
+
+    Used as a context. What was written is kept: on an exception, too, the file is closed in order and appears.
+    """
+
+    def __init__(self, file: Path, comment: str = "") -> None:
+        """Begin the file.
+
+        Args:
+            file: Where it appears in the end.
+            comment: A line for its header.
+        """
+        self.count = 0
+        self._comment = comment.replace("\n", " ")
+        self._stack = ExitStack()
+        self._file = self._stack.enter_context(whole_file(file)).open("wb")
+        self._file.write(self._header())
+
+    def write(self, points: FloatArray, beams: FloatArray, profiles: npt.NDArray[np.int64]) -> None:
+        """Append points `(m, 3)`, unit vectors `(m, 3)` and numbers `(m,)`."""
+        vertices = np.empty(len(points), dtype=_VERTEX)
+        columns = np.column_stack((points, beams))
+        for name, column in zip(_COORDINATES, columns.T, strict=True):
+            vertices[name] = column
+        vertices["profile"] = profiles
+        self._file.write(vertices.tobytes())
+        self.count += len(points)
+
+    def _header(self) -> bytes:
+        """Return the header, whose length does not depend on the number of points."""
+        lines = [
+            "ply",
+            "format binary_little_endian 1.0",
+            f"comment {self._comment}",
+            "comment x y z in mm in the workpiece's frame; beam: direction of the laser; profile: its number",
+            f"comment {'.' * (20 - len(str(self.count)))}",
+            f"element vertex {self.count}",
+            *(f"property float {name}" for name in _COORDINATES),
+            "property uint profile",
+            "end_header",
+        ]
+        return ("\n".join(lines) + "\n").encode("ascii", "replace")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._file.seek(0)
+        self._file.write(self._header())
+        self._file.close()
+        self._stack.close()
+
+
+class XyzWriter:
+    """A text file with a line for each point: x y z in mm, to a tenth of a micrometre. Used as `PlyWriter`."""
+
+    def __init__(self, file: Path) -> None:
+        """Begin the file."""
+        self._stack = ExitStack()
+        self._file = self._stack.enter_context(whole_file(file)).open("w", encoding="ascii")
+
+    def write(self, points: FloatArray) -> None:
+        """Append points `(m, 3)`."""
+        self._file.write(("%.4f %.4f %.4f\n" * len(points)) % tuple(points.ravel()))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._file.close()
+        self._stack.close()
