@@ -234,10 +234,8 @@ class RandomWalk(RuleBasedStateMachine):
         self.rig.follow()
         resting = float(self.rig.wait_for_rest())
         last = self.rig.motion.expectations[-1]
-        allowed = self.rig.profile.tolerance.rest_deg + self.rig.profile.resolution_deg / 2
-        allowed += last.open_at_rest_deg
-        error = resting - last.motion.target_deg
-        require(abs(error) <= allowed, f"at rest {error:.3g} deg from the target, allowed {allowed:.3g}")
+        low, high = self.rig.resting_range()
+        require(low <= resting <= high, f"at rest at {resting:g} deg, allowed {low:.3f} to {high:.3f}")
         # Whatever the time of an increment left open is known now.
         self.rig.expect(b"P " + number(last.motion.target_deg))
         self.rig.wait_for_rest()

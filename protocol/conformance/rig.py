@@ -1,7 +1,7 @@
 """What a case holds in its hands: the table's wire, its motion beside the motion that it should make, and a pencil."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from random import Random
@@ -19,6 +19,8 @@ QUIET_S = 0.05
 
 _POLL_S = 0.005
 _REST_READINGS = 5
+_DELAYS = ((0.0,), (-1.0,), (1.0,), (-1.0, 1.0), (1.0, -1.0))
+"""When commands were carried out, within the times that they leave open: the courses that a motion may have taken."""
 _REST_INTERVAL_S = 0.05
 _REST_TIMEOUT_S = 30.0
 _ANGLE = re.compile(rb"([HL]) (-?(?:0|[1-9][0-9]*)\.([0-9]+))")
@@ -33,16 +35,10 @@ class Sample(NamedTuple):
 
 
 class Expectation(NamedTuple):
-    """A commanded motion, the middle and the half width of the time at which it began, and what that leaves open.
-
-    In motion, the moment of an increment is also its place: on the way and at rest the table may be off by so much.
-    """
+    """A commanded motion, and the time at which it began."""
 
     began_s: float
-    uncertainty_s: float
     motion: Motion
-    open_on_the_way_deg: float = 0.0
-    open_at_rest_deg: float = 0.0
 
     def at(self, time_s: float) -> tuple[float, float]:
         """Return where the reference should be, and at what speed."""
@@ -76,6 +72,7 @@ class Rig:
         self.measurements: list[Measurement] = []
         self.motion = MotionRecord()
         self.top_deg_s = self.rate_deg_s2 = 0.0
+        self._courses: list[list[Expectation]] = []
 
     # What is said on the wire
 
@@ -178,31 +175,22 @@ class Rig:
 
     def stand_at(self, angle_deg: float) -> None:
         """Take it that the reference rests at an angle."""
-        resting = Motion(angle_deg, 0.0, angle_deg, ())
-        self.motion.expectations.append(Expectation(self.wire.clock.now_s(), 0.0, resting))
+        resting = Expectation(self.wire.clock.now_s(), Motion(angle_deg, 0.0, angle_deg, ()))
+        self.motion.expectations.append(resting)
+        self._courses = [self.motion.expectations, *([resting] for _ in _DELAYS[1:])]
 
     def move_to(self, angle_deg: float) -> None:
         """Command P, relative to home."""
         target = self.home_deg + angle_deg
-        began_s, uncertainty_s = self._timed(b"P %s" % number(target))
-        position, speed = self.reference_at(began_s)
-        window_s, open_deg = self._left_open(speed, uncertainty_s)
-        motion = plan(position, speed, target, self.top_deg_s, self.rate_deg_s2)
-        self.motion.expectations.append(Expectation(began_s, window_s, motion, open_deg))
+        self._move(b"P %s" % number(target), lambda _: target)
 
     def move_by(self, angle_deg: float) -> None:
         """Command R."""
-        began_s, uncertainty_s = self._timed(b"R %s" % number(angle_deg))
-        position, speed = self.reference_at(began_s)
-        window_s, open_deg = self._left_open(speed, uncertainty_s)
-        open_deg += abs(speed) * window_s
-        motion = plan(position, speed, position + angle_deg, self.top_deg_s, self.rate_deg_s2)
-        self.motion.expectations.append(Expectation(began_s, window_s, motion, open_deg, open_deg))
+        self._move(b"R %s" % number(angle_deg), lambda position: position + angle_deg)
 
     def reference_at(self, time_s: float) -> tuple[float, float]:
         """Return where the reference should be at a time, and its speed."""
-        expected = [one for one in self.motion.expectations if one.began_s <= time_s] or self.motion.expectations[:1]
-        return expected[-1].at(time_s)
+        return _reference(self.motion.expectations, time_s)
 
     def follow(self, duration_s: float | None = None) -> None:
         """Read the position again and again: for a time, or until the profile should be over."""
@@ -242,10 +230,15 @@ class Rig:
 
     def check_rest(self, name: str) -> None:
         """Measure where the table stands, from the target."""
-        last = self.motion.expectations[-1]
-        allowed = self.profile.tolerance.rest_deg + self.profile.resolution_deg / 2 + last.open_at_rest_deg
-        error = float(self.read()) - last.motion.target_deg
-        self.measure(f"{name}: from the target", error, "deg", -allowed, allowed)
+        target = self.motion.expectations[-1].motion.target_deg
+        low, high = self.resting_range()
+        self.measure(f"{name}: from the target", float(self.read()) - target, "deg", low - target, high - target)
+
+    def resting_range(self) -> tuple[float, float]:
+        """Return where the table may say that it rests; the target of an increment is as open as its moment."""
+        targets = [course[-1].motion.target_deg for course in self._courses]
+        allowed = self.profile.tolerance.rest_deg + self.profile.resolution_deg / 2
+        return min(targets) - allowed, max(targets) + allowed
 
     def wait_for_rest(self) -> Decimal:
         """Return the position once it stays the same."""
@@ -277,22 +270,24 @@ class Rig:
         latest_s = max(reply.first_s - self.profile.byte_s, earliest_s)
         return (earliest_s + latest_s) / 2, (latest_s - earliest_s) / 2 + self._jitter_s
 
-    def _left_open(self, speed_deg_s: float, uncertainty_s: float) -> tuple[float, float]:
-        """Return what the motions before a command, and its own time, leave open of the reference: time and angle."""
-        before = self.motion.expectations[-1]
-        if speed_deg_s == 0.0:
-            return uncertainty_s, before.open_at_rest_deg
-        return uncertainty_s + before.uncertainty_s, before.open_on_the_way_deg
+    def _move(self, command: bytes, target_from: Callable[[float], float]) -> None:
+        """Carry out a motion command, and plan what follows from it for each time at which the table may have."""
+        middle_s, window_s = self._timed(command)
+        for course, delays in zip(self._courses, _DELAYS, strict=True):
+            began_s = middle_s + window_s * delays[len(course) % len(delays)]
+            position, speed = _reference(course, began_s)
+            motion = plan(position, speed, target_from(position), self.top_deg_s, self.rate_deg_s2)
+            course.append(Expectation(began_s, motion))
 
     def excess(self, sample: Sample) -> float:
         """Return how far a sample is from where the reference can have been, with all times as they may have been."""
-        running = [one for one in self.motion.expectations if one.began_s <= sample.time_s]
-        window_s = sample.uncertainty_s + sum(one.uncertainty_s for one in running[-1:])
+        window_s = sample.uncertainty_s
         positions = [
-            self.reference_at(sample.time_s + offset_s)[0]
-            for offset_s in (-window_s, -window_s / 2, 0.0, window_s / 2, window_s)
+            _reference(course, sample.time_s + offset_s)[0]
+            for course in self._courses
+            for offset_s in (-window_s, 0.0, window_s)
         ]
-        half_deg = self.profile.resolution_deg / 2 + sum(one.open_on_the_way_deg for one in running[-1:])
+        half_deg = self.profile.resolution_deg / 2
         low, high = min(positions) - half_deg, max(positions) + half_deg
         return max(low - sample.position_deg, sample.position_deg - high, 0.0)
 
@@ -315,6 +310,12 @@ class Unmoved:
                 abs(after - self._before) <= Decimal(1).scaleb(-self._rig.profile.serial.decimals),
                 f"{self._because!r} moved the table from {self._before} to {after} deg",
             )
+
+
+def _reference(course: Sequence[Expectation], time_s: float) -> tuple[float, float]:
+    """Return where a reference is at a time, and its speed."""
+    running = next((one for one in reversed(course) if one.began_s <= time_s), course[0])
+    return running.at(time_s)
 
 
 def require(condition: bool, otherwise: str) -> None:
