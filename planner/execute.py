@@ -26,6 +26,8 @@ from protocol import ArrivalTimeout, CommandRefused, TableClient, TableError, Ve
 _READING_BYTES = 12
 # A table at rest is within this of its target: 0.05 deg, and the rounding of its answer.
 _AT_REST_DEG = 0.15
+# A reference farther than this from where the stream had it is worth a new stream.
+_SLIP_DEG = 0.03
 # What took longer than this has no certain time: the operating system was busy elsewhere.
 _CERTAIN_S = 0.01
 # Between the last poll and the next command: what the operating system may take.
@@ -172,14 +174,20 @@ class _Run:
         self._see(Observation(self._now_s(), "H", position_deg))
 
     def _corrected(self, commands: Sequence[TimedCommand], number: int) -> Sequence[TimedCommand]:
-        """Return the commands, computed anew from `number` on if the reference is not where it was expected."""
-        drift_deg = self._drift.estimate_deg
-        if abs(drift_deg) <= self._settings.drift_deg or self._running is None:
+        """Return the commands, computed anew from `number` on if the reference will not be where it was expected."""
+        running, timed = self._running, commands[number]
+        if running is None:
             return commands
-        expected = commands[number].expected
-        start = ReferenceState(expected.angle_deg + drift_deg, expected.speed_deg_s)
-        self._drift.forget()
-        self.record.corrections.append(Correction(commands[number].time_s, drift_deg))
+        if abs(self._drift.estimate_deg) > self._settings.drift_deg:
+            there = running.expected
+            moved = ReferenceState(there.angle_deg + self._drift.estimate_deg, there.speed_deg_s)
+            self._running = running = running._replace(expected=moved)
+            self._drift.forget()
+        start = advance(running.expected, running.command, timed.time_s - running.time_s)
+        slip_deg = start.angle_deg - timed.expected.angle_deg
+        if abs(slip_deg) <= _SLIP_DEG:
+            return commands
+        self.record.corrections.append(Correction(timed.time_s, slip_deg))
         return (*commands[:number], *stream(self._motion, self._limits, self._wire, number, start))
 
     def _send(self, timed: TimedCommand) -> None:
@@ -201,8 +209,16 @@ class _Run:
                 f" {LATEST_S:g} s: the table or this machine answers too slowly"
             )
         self._table.move_to(command.target_deg)
-        self._running = timed
+        self._running = self._as_sent(timed, max(0.0, late_s))
         self.record.sent.append(Sent(timed.time_s, late_s, timed.leg.phase, timed.leg.column, command))
+
+    def _as_sent(self, timed: TimedCommand, late_s: float) -> TimedCommand:
+        """Return the command with the moment at which it took effect, and where the reference then was."""
+        if self._running is None:
+            return timed._replace(time_s=timed.time_s + late_s)
+        time_s = timed.time_s + late_s
+        there = advance(self._running.expected, self._running.command, time_s - self._running.time_s)
+        return timed._replace(time_s=time_s, expected=there)
 
     def _prepare_s(self, timed: TimedCommand) -> float:
         """Return when the lines of a command have to begin."""
@@ -259,8 +275,8 @@ class _Run:
         off_deg = max(min(planned_deg) - position_deg, position_deg - max(planned_deg))
         if off_deg > self._settings.tolerance_deg:
             raise StrayedError(
-                f"at {earliest_s:.2f} s the table is at {position_deg:.1f} deg and should be at {planned_deg[0]:.1f}, more"
-                f" than {self._settings.tolerance_deg:g} deg off; does it turn freely?"
+                f"at {earliest_s:.2f} s the table is at {position_deg:.1f} deg and should be at {planned_deg[0]:.1f},"
+                f" more than {self._settings.tolerance_deg:g} deg off; does it turn freely?"
             )
 
     def _see(self, observation: Observation) -> None:

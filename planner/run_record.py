@@ -39,10 +39,13 @@ class Observation(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """From `time_s` on the stream was computed anew: the table was `drift_deg` ahead of where it was expected."""
+    """From `time_s` on the stream was computed anew: the reference was `slip_deg` ahead of where it was to be.
+
+    By what the readings say (clocks that differ), or because a command came late.
+    """
 
     time_s: float
-    drift_deg: float
+    slip_deg: float
 
 
 @dataclass

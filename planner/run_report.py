@@ -114,9 +114,9 @@ def _commands(run: StoredRun) -> str:
 def _corrections(run: StoredRun) -> str:
     corrections = run.record.corrections
     if not corrections:
-        return _note("The table's drift stayed too small to correct.")
-    times = ", ".join(f"{each.time_s:.1f} s ({each.drift_deg:+.2f} deg)" for each in corrections)
-    return _note(f"For drift the stream was computed anew at {times}.")
+        return _note("Neither drift nor late commands had to be corrected.")
+    times = ", ".join(f"{each.time_s:.1f} s ({each.slip_deg:+.2f} deg)" for each in corrections)
+    return _note(f"For drift or a late command the stream was computed anew at {times}.")
 
 
 def _svg(figure: Figure) -> str:

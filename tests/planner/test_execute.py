@@ -161,6 +161,21 @@ def test_an_interrupt_stops_the_table() -> None:
     assert port.table.status().reference_deg < 20.0
 
 
+def test_a_command_that_came_late_is_made_up_for() -> None:
+    def pause_once(data: bytes) -> bytes:
+        port.table.advance(80)
+        return data
+
+    port = FaultyPort(pause_once, fault_s=1.0, faults=1)
+    motion = motion_at(25.0, 3.0)
+    record = run(motion, port, Settings(lead_s=Settings().lag_s))
+    assert record.failure is None
+    assert max(sent.late_s for sent in record.sent) > 0.01
+    assert record.corrections
+    after = [each for each in record.observations if each.source == "inside" and 2.0 < each.time_s < 3.0]
+    assert max(abs(each.encoder_deg - motion.state_at(each.time_s).angle_deg) for each in after) < 0.05
+
+
 def test_a_table_that_answers_late_is_stopped() -> None:
     def dawdle(data: bytes) -> bytes:
         port.table.advance(200)
