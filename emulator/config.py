@@ -107,6 +107,7 @@ class SettlingConfig:
     """How the table is brought to its target once the profile has ended."""
 
     arrival_count: int = quantity(least=0, most=100)
+    arrival_time_s: float = quantity(least=0, most=10)
     approach_rate_1_s: float = quantity(above=0, most=100)
     approach_speed_deg_s: float = quantity(above=0, most=1e6)
 

@@ -4,7 +4,7 @@ A motion runs through these states:
 
     IDLE     the drive is off; friction holds the table
     MOVING   the profile runs, the PID follows its speed
-    SETTLING the profile has ended; the table creeps to the target until the encoder reaches it, then IDLE
+    SETTLING the profile has ended; the table creeps until the encoder has stayed at the target for a while, then IDLE
     STALLED  the motor was driven but the encoder stood still: the drive is off until the next motion
 """
 
@@ -31,6 +31,7 @@ class Firmware(NamedTuple):
     pid: Pid
     window_ticks: int
     arrival_count: int
+    arrival_ticks: int
     approach_rate: int  # of speed over remaining distance, per tick; 26 fraction bits
     approach_speed: int  # count/tick, 26 fraction bits
     stall_duty: int  # PWM steps
@@ -48,6 +49,7 @@ class FirmwareState(NamedTuple):
     pid: PidState
     still_ticks: int  # driven hard without a change of the count
     settling_ticks: int
+    arrived_ticks: int  # within the arrival window without a break
 
 
 def firmware(config: TableConfig) -> Firmware:
@@ -58,6 +60,7 @@ def firmware(config: TableConfig) -> Firmware:
         pid=pid(config),
         window_ticks=config.control.speed_window_ticks,
         arrival_count=settling.arrival_count,
+        arrival_ticks=max(1, round(settling.arrival_time_s * tick_hz)),
         approach_rate=to_fixed(settling.approach_rate_1_s / tick_hz, SPEED_BITS),
         approach_speed=to_fixed(settling.approach_speed_deg_s * config.counts_per_turn / 360.0 / tick_hz, SPEED_BITS),
         stall_duty=round(protection.stall_duty * duty_max(config)),
@@ -76,6 +79,7 @@ def power_on(parameters: Firmware, profile: Profile, count: int) -> FirmwareStat
         pid=PidState(0, 0, HOLD, 0),
         still_ticks=0,
         settling_ticks=0,
+        arrived_ticks=0,
     )
 
 
@@ -84,7 +88,7 @@ def begin_motion(state: FirmwareState, profile: Profile, distance: int) -> Firmw
 
     The reference goes on from its present position and speed; that of a table that stalled is where it stands.
     """
-    return FirmwareState(MOVING, profile, retarget(state.reference, distance), state.counts, state.pid, 0, 0)
+    return FirmwareState(MOVING, profile, retarget(state.reference, distance), state.counts, state.pid, 0, 0, 0)
 
 
 def distance_to(reference: Reference, target: int) -> int:
@@ -94,12 +98,12 @@ def distance_to(reference: Reference, target: int) -> int:
 
 def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareState:
     """Return the controller after one tick, at the end of which the encoder's counter reads `count`."""
-    motion, profile, reference, counts, regulator, still_ticks, settling_ticks = state
+    motion, profile, reference, counts, regulator, still_ticks, settling_ticks, arrived_ticks = state
     measured = wrap_int32(count - counts[0])
     last_count = counts[-1]
     counts = (*counts[1:], count)
     if motion in (IDLE, STALLED):
-        return FirmwareState(motion, profile, reference, counts, switched_off(regulator, measured), 0, 0)
+        return FirmwareState(motion, profile, reference, counts, switched_off(regulator, measured), 0, 0, 0)
 
     if motion == MOVING:
         last_speed = reference.speed
@@ -110,10 +114,12 @@ def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareStat
             motion = SETTLING
     else:
         remaining = position_error(reference, count)
-        passed = remaining * position_error(reference, last_count) <= 0
-        if abs(remaining) <= parameters.arrival_count or passed:
-            return FirmwareState(IDLE, profile, reference, counts, switched_off(regulator, measured), 0, 0)
+        arrived_ticks = arrived_ticks + 1 if abs(remaining) <= parameters.arrival_count else 0
+        if arrived_ticks >= parameters.arrival_ticks:
+            return FirmwareState(IDLE, profile, reference, counts, switched_off(regulator, measured), 0, 0, 0)
         demand = clamp(remaining * parameters.approach_rate, parameters.approach_speed)
+        if arrived_ticks:
+            demand = 0
         gain_set = HOLD
         settling_ticks += 1
 
@@ -123,8 +129,8 @@ def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareStat
     still_ticks = still_ticks + 1 if still else 0
     if still_ticks >= parameters.stall_ticks or settling_ticks >= parameters.settling_ticks:
         stands = Reference(count, 0, 0, 0, 0)
-        return FirmwareState(STALLED, profile, stands, counts, switched_off(regulator, measured), 0, 0)
-    return FirmwareState(motion, profile, reference, counts, regulator, still_ticks, settling_ticks)
+        return FirmwareState(STALLED, profile, stands, counts, switched_off(regulator, measured), 0, 0, 0)
+    return FirmwareState(motion, profile, reference, counts, regulator, still_ticks, settling_ticks, arrived_ticks)
 
 
 def position_error(reference: Reference, count: int) -> int:

@@ -93,13 +93,24 @@ def test_ramps_have_their_own_gain_set() -> None:
     assert {state.pid.gain_set for state in moving} == {HOLD, RAMP}
 
 
-def test_the_motion_ends_when_the_encoder_reaches_the_target_or_passes_it() -> None:
+def test_the_motion_ends_when_the_encoder_has_stayed_at_the_target() -> None:
     settling = begin_motion(woken(), PROFILE, 0)
     settling = settling._replace(motion=SETTLING, reference=Reference(100, 0, 0, 0, 0), counts=(90,) * 8)
-    assert step(FIRMWARE, settling, 98).motion == SETTLING
-    assert step(FIRMWARE, settling, 99).motion == IDLE
-    assert step(FIRMWARE, settling, 100).motion == IDLE
-    assert step(FIRMWARE, settling, 140).motion == IDLE
+    ticks = FIRMWARE.arrival_ticks
+    states = run(settling, lambda _: 99, ticks)
+    assert motions(states) == [SETTLING, IDLE]
+    assert [state.motion for state in states].index(IDLE) == ticks - 1
+
+
+def test_a_table_that_is_pushed_away_from_its_target_is_brought_back_first() -> None:
+    settling = begin_motion(woken(), PROFILE, 0)
+    settling = settling._replace(motion=SETTLING, reference=Reference(100, 0, 0, 0, 0), counts=(100,) * 8)
+    arriving = run(settling, lambda _: 100, FIRMWARE.arrival_ticks - 1)[-1]
+    pushed = step(FIRMWARE, arriving, 102)
+    assert pushed.motion == SETTLING
+    assert pushed.pid.integral < arriving.pid.integral
+    again = run(pushed, lambda _: 101, FIRMWARE.arrival_ticks)
+    assert [state.motion for state in again].index(IDLE) == FIRMWARE.arrival_ticks - 1
 
 
 def test_a_table_that_creeps_too_long_is_switched_off() -> None:

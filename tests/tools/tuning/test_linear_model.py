@@ -20,7 +20,7 @@ def frictionless(backlash_arcmin: float) -> TableConfig:
         CONFIG,
         friction=replace(CONFIG.friction, coulomb_Nm=0.0),
         table=replace(CONFIG.table, bearing_friction_Nm=0.0),
-        gears=replace(CONFIG.gears, backlash_arcmin=backlash_arcmin),
+        gears=replace(CONFIG.gears, backlash_arcmin=backlash_arcmin, efficiency=1.0),  # their losses are friction too
     )
 
 
