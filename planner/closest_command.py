@@ -14,9 +14,6 @@ from planner.wire import Grid
 
 # A speed below this counts as standing: it is what additions leave of zero.
 STANDING_DEG_S = 1e-6
-# A command may come this late before the table starts to brake for the target of the one before.
-LATEST_S = 0.1
-
 # What a deg of error at the end of a step is weighed against: half as much in its middle; the way that an error of the
 # end's speed makes in a third of a step; and, in the smallest number a degree, the way that the table runs on when the
 # line dies, so that of equals the one is taken which stops soonest.
@@ -24,6 +21,11 @@ _MIDDLE_WEIGHT = 0.5
 _SPEED_WEIGHT = 0.3
 _RUN_ON_WEIGHT = 1e-4
 _SHORT_RUN_ON_DEG = 90.0
+
+
+def latest_s(duration_s: float) -> float:
+    """Return how late the command after a step may come before the table brakes for the target of the step."""
+    return max(0.1, 0.5 * duration_s)
 
 
 def closest_command(state: ReferenceState, leg: Leg, grid: Grid) -> MotionCommand:
@@ -110,7 +112,7 @@ def command_towards(
 ) -> MotionCommand:
     """Return the command of a signed speed, with the nearest target for which the table does not brake too soon."""
     forward = math.copysign(1.0, speed_deg_s)
-    late = _ramp(state, speed_deg_s, rate_deg_s2, duration_s + LATEST_S)
+    late = _ramp(state, speed_deg_s, rate_deg_s2, duration_s + latest_s(duration_s))
     farthest = forward * state.angle_deg
     if forward * late.speed_deg_s > 0.0:
         farthest = max(farthest, forward * late.angle_deg + 0.5 * late.speed_deg_s**2 / rate_deg_s2)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.closest_command import LATEST_S
+from planner.closest_command import latest_s
 from planner.errors import PlannerError
 from planner.inside_view import InsideView
 from planner.motion import Limits
@@ -203,10 +203,11 @@ class _Run:
         due_s = timed.time_s - self._settings.lead_s - under_way_s
         self._sleep_until(due_s)
         late_s = self._now_s() - due_s
-        if late_s > LATEST_S:
+        allowed_s = latest_s(timed.leg.duration_s if self._running is None else self._running.leg.duration_s)
+        if late_s > allowed_s:
             raise ExecutionError(
                 f"the command of location {timed.leg.column} would have come {late_s:.2f} s late, more than"
-                f" {LATEST_S:g} s: the table or this machine answers too slowly"
+                f" {allowed_s:g} s: the table or this machine answers too slowly"
             )
         self._table.move_to(command.target_deg)
         self._running = self._as_sent(timed, max(0.0, late_s))
@@ -258,10 +259,10 @@ class _Run:
         time_s = self._now_s() + self._wire.seconds(2)
         position_deg = self._table.position_deg()
         # The table looked at its encoder at some time from here to there: mostly here, when the answer is in time.
-        latest_s = self._now_s() - self._wire.seconds(_READING_BYTES - 2)
-        is_certain = latest_s - time_s < _CERTAIN_S
+        answered_s = self._now_s() - self._wire.seconds(_READING_BYTES - 2)
+        is_certain = answered_s - time_s < _CERTAIN_S
         self._see(Observation(time_s, "H" if is_certain else "H late", position_deg))
-        self._check(position_deg, time_s, max(time_s, latest_s))
+        self._check(position_deg, time_s, max(time_s, answered_s))
         assert self._running is not None
         # Where the reference was a lag ago, there the encoder is now.
         since_s = time_s + self._settings.lead_s - self._settings.lag_s - self._running.time_s
@@ -269,13 +270,13 @@ class _Run:
             expected = advance(self._running.expected, self._running.command, since_s)
             self._drift.take(time_s, position_deg - expected.angle_deg)
 
-    def _check(self, position_deg: float, earliest_s: float, latest_s: float) -> None:
+    def _check(self, position_deg: float, sent_s: float, answered_s: float) -> None:
         """Stop the run where the position is not what the plan has from one time to another."""
-        planned_deg = [self._motion.state_at(time_s).angle_deg for time_s in np.linspace(earliest_s, latest_s, 5)]
+        planned_deg = [self._motion.state_at(time_s).angle_deg for time_s in np.linspace(sent_s, answered_s, 5)]
         off_deg = max(min(planned_deg) - position_deg, position_deg - max(planned_deg))
         if off_deg > self._settings.tolerance_deg:
             raise StrayedError(
-                f"at {earliest_s:.2f} s the table is at {position_deg:.1f} deg and should be at {planned_deg[0]:.1f},"
+                f"at {sent_s:.2f} s the table is at {position_deg:.1f} deg and should be at {planned_deg[0]:.1f},"
                 f" more than {self._settings.tolerance_deg:g} deg off; does it turn freely?"
             )
 

@@ -16,7 +16,7 @@ from protocol import TableError
 from tools.preemption import draw_preemption, stand_in
 
 SCAN = "cylinder"
-TIME_SCALE = 2.0
+TIME_SCALE = 1.5
 """The stand-in runs this much faster than real, so that nobody waits for a scan of 47 s."""
 LEAD_S = 0.0058
 """How far the stand-in's encoder runs behind its reference."""
