@@ -123,12 +123,12 @@ def link_frames(arm: FloatArray, joints: FloatArray, frames: FloatArray) -> None
     """Write the base frame and the frame after each joint into `frames`, for an arm's table and joints `(6,)`.
 
     Only the upper three rows are written, so `frames` may be `(7, 3, 4)` as well as `(7, 4, 4)`. The last is the
-    flange's.
+    flange's. Fewer frames are those of the first joints.
     """
     for row in range(3):
         for column in range(4):
             frames[0, row, column] = 1.0 if row == column else 0.0
-    for j in range(6):
+    for j in range(len(frames) - 1):
         c, s = math.cos(joints[j]), math.sin(joints[j])
         ca, sa = arm[j, COS_ALPHA], arm[j, SIN_ALPHA]
         a, d = arm[j, A_MM], arm[j, D_MM]

@@ -17,7 +17,7 @@ from planner.arrays import FloatArray
 from planner.bodies import FLANGE_FRAME, WRIST_LINK, Bodies
 from planner.capsule import segment_distance
 from planner.kernel import kernel
-from planner.obstacles import FIELD, Obstacle
+from planner.obstacles import FIELD, Obstacle, bounding_box
 from planner.signed_distance_field import NO_FIELD, SignedDistanceField, field_distance
 from planner.solid import solid_distance
 from planner.transforms import rotations_z
@@ -26,10 +26,18 @@ IndexArray = npt.NDArray[np.int64]
 
 _FIXED_LINK = 0
 _WRIST_FRAMES = (4, 5)
+ARM_FRAMES = 4
+"""The frames from the base's on that bodies move with; none moves with the wrist's, and then comes the flange's."""
 _BEAM = "beam"
 
 # The columns of the bodies' table: the frame that a body moves with, its ends there in mm, its radius in mm.
 _FRAME, _START, _END, _RADIUS = 0, 1, 4, 7
+# Those of the obstacles' table: the kind, three sizes, the least and the greatest x y z of a box around it.
+_KIND, _SIZE, _LOWER, _UPPER = 0, 1, 4, 7
+# Those of a placed body: its ends and its middle in the base, half its length; all in mm.
+_MIDDLE, _HALF_LENGTH = 6, 9
+PLACED = 10
+"""Columns of the table of placed bodies."""
 
 
 class CollisionModel(NamedTuple):
@@ -39,7 +47,7 @@ class CollisionModel(NamedTuple):
 
     Attributes:
         bodies: `(n_bodies, 8)`, one row each; the beam's ends are one mm apart.
-        obstacles: `(n_obstacles, 4)`, the kind and three sizes.
+        obstacles: `(n_obstacles, 10)`, the kind, three sizes, and a box around it in its own frame.
         field: Of the one obstacle that is a mesh.
         pairs: `(n_pairs, 2)`, a body and another one or an obstacle. Those of the flange's bodies with the obstacles
             come first: they are common to all configurations.
@@ -94,7 +102,9 @@ def collision_model(
                 [FLANGE_FRAME, *beam_start, *(beam_start + beam_axis), bodies.beam.radius_mm],
             ]
         ),
-        obstacles=np.array([[obstacle.kind, *obstacle.size_mm] for obstacle in obstacles]).reshape(-1, 4),
+        obstacles=np.array(
+            [[obstacle.kind, *obstacle.size_mm, *np.concatenate(bounding_box(obstacle))] for obstacle in obstacles]
+        ).reshape(-1, 10),
         field=fields[0] if fields else NO_FIELD,
         pairs=pairs,
         n_common=n_common,
@@ -176,12 +186,13 @@ def place_bodies(
         beam_mm: The beam's length.
         first: The first frame.
         last: The last frame.
-        placed: Written: `(n_bodies, 6)`, x y z of the start, then of the end.
+        placed: Written: `(n_bodies, PLACED)`, x y z of the start, the end and the middle, and half the length.
     """
     for body in range(len(bodies)):
         f = int(bodies[body, _FRAME])
         if not first <= f <= last:
             continue
+        half2 = 0.0
         for row in range(3):
             r0, r1, r2, origin = frames[f, row, 0], frames[f, row, 1], frames[f, row, 2], frames[f, row, 3]
             start = r0 * bodies[body, _START] + r1 * bodies[body, _START + 1] + r2 * bodies[body, _START + 2]
@@ -190,6 +201,9 @@ def place_bodies(
                 end = start + beam_mm * (end - start)
             placed[body, row] = start + origin
             placed[body, 3 + row] = end + origin
+            placed[body, _MIDDLE + row] = 0.5 * (start + end) + origin
+            half2 += 0.25 * (end - start) * (end - start)
+        placed[body, _HALF_LENGTH] = sqrt(half2)
 
 
 @kernel
@@ -209,7 +223,7 @@ def nearest_pair(
         field_values: The model's field.
         field_origin: Its origin.
         field_spacing: Its spacing.
-        placed: `(n_bodies, 6)`, see `place_bodies`.
+        placed: `(n_bodies, PLACED)`, see `place_bodies`.
         obstacle_frames: `(n_angles, n_obstacles, 3, 4)`, see `base_in_obstacles`.
         angle: Which of the table angles.
         first: The first pair to look at.
@@ -224,20 +238,26 @@ def nearest_pair(
         bound = min(least, 0.0) if body == beam else least
         if other <= beam:
             radius += bodies[other, _RADIUS]
-            distance = _body_distance(placed, body, other, bound + radius)
+            if _spheres_apart(placed, body, other, bound + radius):
+                continue
+            distance = _body_distance(placed, body, other)
         else:
             i = other - beam - 1
-            ax, ay, az = _in_frame(obstacle_frames, angle, i, placed[body, 0], placed[body, 1], placed[body, 2])
-            bx, by, bz = _in_frame(obstacle_frames, angle, i, placed[body, 3], placed[body, 4], placed[body, 5])
-            kind = int(obstacles[i, 0])
+            x, y, z = _in_frame(obstacle_frames, angle, i, placed, body, _MIDDLE)
+            if _sphere_outside(obstacles, i, x, y, z, placed[body, _HALF_LENGTH] + bound + radius):
+                continue
+            ax, ay, az = _in_frame(obstacle_frames, angle, i, placed, body, 0)
+            bx, by, bz = _in_frame(obstacle_frames, angle, i, placed, body, 3)
+            kind = int(obstacles[i, _KIND])
             if kind == FIELD:
                 distance = field_distance(
                     field_values, field_origin, field_spacing, ax, ay, az, bx, by, bz, bound + radius
                 )
             else:
                 distance = solid_distance(
-                    kind, obstacles[i, 1], obstacles[i, 2], obstacles[i, 3], ax, ay, az, bx, by, bz, bound + radius
-                )
+                    kind, obstacles[i, _SIZE], obstacles[i, _SIZE + 1], obstacles[i, _SIZE + 2],
+                    ax, ay, az, bx, by, bz, bound + radius,
+                )  # fmt: skip
         # Not by the difference: it would take a distance that is only known to be enough for a smaller one.
         if distance < bound + radius:
             least, nearest = distance - radius, pair
@@ -245,18 +265,27 @@ def nearest_pair(
 
 
 @kernel
-def _body_distance(placed: FloatArray, a: int, b: int, enough_mm: float) -> float:
-    """Return the distance in mm of two placed segments; exact where it is below `enough_mm`."""
-    # Spheres around the segments may show that they are far enough apart. All lengths doubled: nothing needs halving.
-    between, length_a, length_b = 0.0, 0.0, 0.0
-    for row in range(3):
-        along_a, along_b = placed[a, 3 + row] - placed[a, row], placed[b, 3 + row] - placed[b, row]
-        gap = placed[a, row] + placed[a, 3 + row] - placed[b, row] - placed[b, 3 + row]
-        between += gap * gap
-        length_a += along_a * along_a
-        length_b += along_b * along_b
-    if sqrt(between) - sqrt(length_a) - sqrt(length_b) >= 2.0 * enough_mm:
-        return enough_mm
+def _spheres_apart(placed: FloatArray, a: int, b: int, enough_mm: float) -> bool:
+    """Return whether the spheres around two placed segments are at least `enough_mm` apart."""
+    dx = placed[a, _MIDDLE] - placed[b, _MIDDLE]
+    dy = placed[a, _MIDDLE + 1] - placed[b, _MIDDLE + 1]
+    dz = placed[a, _MIDDLE + 2] - placed[b, _MIDDLE + 2]
+    apart = placed[a, _HALF_LENGTH] + placed[b, _HALF_LENGTH] + enough_mm
+    return bool(dx * dx + dy * dy + dz * dz >= apart * abs(apart))
+
+
+@kernel
+def _sphere_outside(obstacles: FloatArray, i: int, x: float, y: float, z: float, radius: float) -> bool:
+    """Return whether a sphere is outside the box around an obstacle."""
+    dx = max(obstacles[i, _LOWER] - x, x - obstacles[i, _UPPER], 0.0)
+    dy = max(obstacles[i, _LOWER + 1] - y, y - obstacles[i, _UPPER + 1], 0.0)
+    dz = max(obstacles[i, _LOWER + 2] - z, z - obstacles[i, _UPPER + 2], 0.0)
+    outside2 = dx * dx + dy * dy + dz * dz
+    return bool(outside2 > 0.0 and outside2 >= radius * abs(radius))
+
+
+@kernel
+def _body_distance(placed: FloatArray, a: int, b: int) -> float:
     return segment_distance(
         placed[a, 0], placed[a, 1], placed[a, 2], placed[a, 3], placed[a, 4], placed[a, 5],
         placed[b, 0], placed[b, 1], placed[b, 2], placed[b, 3], placed[b, 4], placed[b, 5],
@@ -264,7 +293,11 @@ def _body_distance(placed: FloatArray, a: int, b: int, enough_mm: float) -> floa
 
 
 @kernel
-def _in_frame(frames: FloatArray, angle: int, i: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+def _in_frame(
+    frames: FloatArray, angle: int, i: int, placed: FloatArray, body: int, at: int
+) -> tuple[float, float, float]:
+    """Return a placed body's point, from column `at` on, as obstacle `i` sees it."""
+    x, y, z = placed[body, at], placed[body, at + 1], placed[body, at + 2]
     return (
         frames[angle, i, 0, 0] * x + frames[angle, i, 0, 1] * y + frames[angle, i, 0, 2] * z + frames[angle, i, 0, 3],
         frames[angle, i, 1, 0] * x + frames[angle, i, 1, 1] * y + frames[angle, i, 1, 2] * z + frames[angle, i, 1, 3],
@@ -278,7 +311,7 @@ def _clearance_of_each(
     field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
     obstacle_frames: FloatArray, clearance_mm: FloatArray, pair: IndexArray,
 ) -> None:  # fmt: skip
-    frames, placed = np.empty((7, 3, 4)), np.empty((len(bodies), 6))
+    frames, placed = np.empty((7, 3, 4)), np.empty((len(bodies), PLACED))
     for i in range(len(joints)):
         link_frames(arm, joints[i], frames)
         place_bodies(bodies, frames, beam_mm, 0, FLANGE_FRAME, placed)

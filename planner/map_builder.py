@@ -15,7 +15,7 @@ import numpy.typing as npt
 from planner.arm import link_frames
 from planner.arrays import CodeArray, FloatArray
 from planner.bodies import FLANGE_FRAME
-from planner.collision import base_in_obstacles, nearest_pair, place_bodies
+from planner.collision import ARM_FRAMES, PLACED, base_in_obstacles, nearest_pair, place_bodies
 from planner.config_map import DEFAULT_EPSILON, ConfigurationMap
 from planner.configuration import Configuration
 from planner.inverse_kinematics import inverse
@@ -184,8 +184,8 @@ def _rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between 
     The joints `(..., 6)` and the clearance of each cell are written too, unless their arrays are empty.
     """
     joints, codes = np.empty((8, 6)), np.empty(8, dtype=np.uint8)
-    frames, placed = np.empty((7, 3, 4)), np.empty((len(bodies), 6))
-    flange = frames[FLANGE_FRAME]
+    frames, placed = np.empty((7, 3, 4)), np.empty((len(bodies), PLACED))
+    flange, arm_frames = frames[FLANGE_FRAME], frames[:ARM_FRAMES]
     comfortable_mm = value[COMFORTABLE_CLEARANCE_MM]
     for column in range(values.shape[1]):
         for angle in range(values.shape[2]):
@@ -212,8 +212,8 @@ def _rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between 
                         clearance_mm, pair = common_mm, common_pair
                         # A tool that collides does so in every configuration: no need to look further.
                         if common_mm > value[MINIMUM_CLEARANCE_MM]:
-                            link_frames(arm, joints[slot], frames)
-                            place_bodies(bodies, frames, beam_mm, 0, FLANGE_FRAME - 1, placed)
+                            link_frames(arm, joints[slot], arm_frames)
+                            place_bodies(bodies, frames, beam_mm, 0, ARM_FRAMES - 1, placed)
                             clearance_mm, own_pair = nearest_pair(
                                 pairs, bodies, obstacles, field_values, field_origin, field_spacing,
                                 placed, obstacle_frames, angle, n_common, len(pairs), common_mm,

@@ -174,24 +174,23 @@ def field_distance(
     """Return a lower bound in mm of the least signed distance of the segment a-b from the mesh.
 
     It is never above the true distance and, where the segment runs within the grid, at most two spacings below.
-    Where the distance is `enough_mm` or more, the result is only known to be at least that. The walk along the
-    segment strides as far as the distance at hand allows: nothing nearer than the least one found can lie within
-    the difference of the two.
+    Where the distance is `enough_mm` or more, the result is only known to be at least that. The walk goes from the
+    middle to both ends and strides as far as the distance at hand allows: nothing nearer than the least one found can
+    lie within the difference of the two.
     """
     ux, uy, uz = bx - ax, by - ay, bz - az
     length = sqrt(ux * ux + uy * uy + uz * uz)
-    shortest = _STEP * spacing
+    half, shortest = 0.5 * length, _STEP * spacing
     # Half a cell's diagonal from the look-up, half a shortest stride from the walk.
     error = (0.5 * sqrt(3.0) + 0.5 * _STEP) * spacing
     middle = look_up(values, origin, spacing, ax + 0.5 * ux, ay + 0.5 * uy, az + 0.5 * uz)
-    if middle - 0.5 * length - error >= enough_mm:
-        return middle - 0.5 * length - error
-    least = enough_mm + error
-    along = 0.0
-    while True:
-        t = along / length if length > 0.0 else 0.0
-        value = look_up(values, origin, spacing, ax + t * ux, ay + t * uy, az + t * uz)
-        least = min(least, value)
-        if along >= length:
-            return least - error
-        along = min(along + max(value - least, shortest), length)
+    least = min(enough_mm + error, middle)
+    for end in (-1.0, 1.0):
+        along, value = 0.0, middle
+        # The brackets matter: no less than `half` once `along` is, so that rounding cannot keep the walk from ending.
+        while along + (value - least) < half:
+            along = min(along + max(value - least, shortest), half)
+            t = 0.5 + end * along / length
+            value = look_up(values, origin, spacing, ax + t * ux, ay + t * uy, az + t * uz)
+            least = min(least, value)
+    return least - error

@@ -121,6 +121,15 @@ def test_a_segment_is_never_nearer_than_the_field_says(a: tuple[float, ...], b: 
     assert ours <= exact.min()
 
 
+def test_every_walk_ends_at_the_least_distance_that_it_met() -> None:
+    rng = np.random.default_rng(0)
+    for a, b in rng.uniform(-60.0, 60.0, (2000, 2, 3)):
+        along = np.linspace(a, b, 50)
+        met = min(look_up(*field(), *map(float, p)) for p in along)
+        assert walked(tuple(a), tuple(b), 30.0) <= met
+        assert walked(tuple(a), tuple(b), 30.0) >= min(met, 30.0) - 2.0 * SPACING_MM
+
+
 @settings(deadline=None)
 @given(a=point, b=point, enough_mm=st.floats(-10, 60))
 def test_a_bound_keeps_what_is_below_it(a: tuple[float, ...], b: tuple[float, ...], enough_mm: float) -> None:
