@@ -175,8 +175,8 @@ def field_distance(
 
     It is never above the true distance and, where the segment runs within the grid, at most two spacings below.
     Where the distance is `enough_mm` or more, the result is only known to be at least that. The walk goes from the
-    middle to both ends and strides as far as the distance at hand allows: nothing nearer than the least one found can
-    lie within the difference of the two.
+    middle towards each end and strides as far as the distance at hand allows: nothing nearer than the least one found
+    can lie within the difference of the two, nor within that of the end.
     """
     ux, uy, uz = bx - ax, by - ay, bz - az
     length = sqrt(ux * ux + uy * uy + uz * uz)
@@ -185,12 +185,15 @@ def field_distance(
     error = (0.5 * sqrt(3.0) + 0.5 * _STEP) * spacing
     middle = look_up(values, origin, spacing, ax + 0.5 * ux, ay + 0.5 * uy, az + 0.5 * uz)
     least = min(enough_mm + error, middle)
-    for end in (-1.0, 1.0):
+    for end in (-0.5, 0.5):
+        t = 0.5 + end
+        last = look_up(values, origin, spacing, ax + t * ux, ay + t * uy, az + t * uz)
+        least = min(least, last)
         along, value = 0.0, middle
         # The brackets matter: no less than `half` once `along` is, so that rounding cannot keep the walk from ending.
-        while along + (value - least) < half:
+        while along + ((value - least) + (last - least)) < half:
             along = min(along + max(value - least, shortest), half)
-            t = 0.5 + end * along / length
+            t = 0.5 + end * (along / half)
             value = look_up(values, origin, spacing, ax + t * ux, ay + t * uy, az + t * uz)
             least = min(least, value)
     return least - error
