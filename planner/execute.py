@@ -57,7 +57,7 @@ class Settings(NamedTuple):
         look_s: the same for looks from inside.
     """
 
-    lag_s: float = 0.0058
+    lag_s: float = 0.0035
     lead_s: float = 0.0
     tolerance_deg: float = 1.0
     drift_deg: float = 0.1

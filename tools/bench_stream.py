@@ -20,7 +20,7 @@ from tools.timing import print_table
 from tools.virtual_run import VirtualRun, random_run_inputs, run_in_virtual_time, shipped_run_input
 
 RANDOM_PLANS = 200
-LEAD_S = 0.0058
+LEAD_S = 0.0035
 OFF = (0.8, 1.2)
 PLANT = {
     "motor.resistance_ohm": 2.18,
@@ -125,7 +125,7 @@ def _bench_random(out: TextIO) -> None:
     rows = []
     for name, margin, lead_s in (
         ("planned one sample clear", 1, 0.0),
-        ("planned one sample clear, 5.8 ms ahead", 1, LEAD_S),
+        ("planned one sample clear, 3.5 ms ahead", 1, LEAD_S),
         ("planned up to the cells", 0, LEAD_S),
     ):
         runs = [

@@ -18,7 +18,7 @@ from tools.preemption import draw_preemption, stand_in
 SCAN = "cylinder"
 TIME_SCALE = 1.5
 """The stand-in runs this much faster than real, so that nobody waits for a scan of 47 s."""
-LEAD_S = 0.0058
+LEAD_S = 0.0035
 """How far the stand-in's encoder runs behind its reference."""
 
 

@@ -40,7 +40,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )
     parser.add_argument(
         "--lead", type=float, default=Settings().lead_s, metavar="S",
-        help="send commands ahead by the encoder's lag behind the reference: 0.0058 for the stand-in (default 0)",
+        help="send commands ahead by the encoder's lag behind the reference: 0.0035 for the stand-in (default 0)",
     )  # fmt: skip
     parser.add_argument(
         "--tolerance", type=float, default=DEFAULT_TOLERANCE_DEG, metavar="DEG",
