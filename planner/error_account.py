@@ -24,7 +24,7 @@ from planner.probe import Profiles
 
 # The table's encoder: 384 counts a motor turn, 480 motor turns a table turn.
 COUNTS_PER_DEG = 512.0
-# At most so many points are looked at, at least half of them where there are more; their sigma is good to half a percent.
+# At most so many points are looked at, and at least half as many of a larger cloud: their sigma is good to 0.5 %.
 SAMPLES = 40_000
 
 

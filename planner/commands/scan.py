@@ -4,6 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from planner.commands.map import angle_count
 from planner.errors import PlannerError
 from planner.latched_run import TriggerConditions
 from planner.progress import progress_line
@@ -45,6 +46,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--configuration", metavar="NAME", default="best", help="such as LEFTY-ABOVE-NOFLIP, or best (the default)"
     )
     parser.add_argument(
+        "--angles", type=angle_count, default=360, metavar="COUNT", help="table angles over one turn (default 360)"
+    )
+    parser.add_argument(
         "--exact-calibration", action="store_true", help="align with the true placements instead of calibrated ones"
     )
     parser.add_argument("--xyz", action="store_true", help="write cloud.xyz as well")
@@ -66,6 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
         decimals=arguments.decimals,
         control=arguments.control,
         configuration=arguments.configuration,
+        angle_count=arguments.angles,
         exact_calibration=arguments.exact_calibration,
         xyz=arguments.xyz,
         triggers=TriggerConditions(rate_hz=arguments.rate, seed=arguments.seed),

@@ -24,7 +24,9 @@ def taken(mesh: trimesh.Trimesh, T_WS: FloatArray, probe: LaserProbe = QUIET) ->
 
 def plate(thickness_mm: float = 10.0) -> trimesh.Trimesh:
     """Return a plate whose top is z = 0."""
-    return trimesh.creation.box((400.0, 400.0, thickness_mm)).apply_translation((0.0, 0.0, -0.5 * thickness_mm))
+    mesh: trimesh.Trimesh = trimesh.creation.box((400.0, 400.0, thickness_mm))
+    mesh.apply_translation((0.0, 0.0, -0.5 * thickness_mm))
+    return mesh
 
 
 def test_a_plate_at_the_stand_off_is_a_straight_line_of_full_width() -> None:
@@ -82,7 +84,8 @@ def slot(half_width_mm: float, depth_mm: float) -> trimesh.Trimesh:
     """Return a slot along x with its floor at z = 0."""
     wall = trimesh.creation.box((400.0, 100.0, depth_mm))
     sides = [wall.copy().apply_translation((0, y * (half_width_mm + 50.0), 0.5 * depth_mm)) for y in (-1, 1)]
-    return trimesh.util.concatenate((plate(), *sides))
+    mesh: trimesh.Trimesh = plate() + sides[0] + sides[1]
+    return mesh
 
 
 @pytest.mark.parametrize(("half_width_mm", "is_measured"), [(11.9, False), (12.1, True)])
@@ -95,7 +98,7 @@ def test_the_floor_of_a_slot_is_seen_while_a_camera_looks_over_its_edge(
 
 def test_one_camera_is_enough() -> None:
     one_wall = trimesh.creation.box((400.0, 100.0, 60.0)).apply_translation((0.0, 55.0, 30.0))
-    both = trimesh.util.concatenate(plate(), one_wall)
+    both: trimesh.Trimesh = plate() + one_wall
     assert len(taken(both, from_above(150.0)).points_S) == 640
     for camera, count in ((0, 640), (1, 640)):
         lone = replace(QUIET, cameras_mm=(QUIET.cameras_mm[camera],))

@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 import trimesh
@@ -20,9 +22,10 @@ def test_hits_are_those_of_an_exact_caster_in_double_precision() -> None:
     mesh = trimesh.creation.icosphere(subdivisions=3, radius=80.0)
     mesh.apply_translation((300.0, -200.0, 100.0))
     origins, directions = aimed_rays(400, 80.0)
-    origins = origins + (300.0, -200.0, 100.0)
+    origins += np.array((300.0, -200.0, 100.0))
     triangles, distances_mm = RayCaster(mesh).first_hits(origins, directions)
-    places, rays, expected = RayMeshIntersector(mesh).intersects_location(origins, directions, multiple_hits=False)
+    exact: Any = RayMeshIntersector(mesh)  # type: ignore[no-untyped-call] # trimesh has no types here
+    places, rays, expected = exact.intersects_location(origins, directions, multiple_hits=False)
     assert sorted(rays) == list(np.flatnonzero(triangles >= 0))
     assert 0 < len(rays) < 400
     assert (triangles[rays] == expected).all()
@@ -64,6 +67,7 @@ def test_triangles_without_area_are_passed_over() -> None:
 )
 def test_an_eye_sees_a_point_that_faces_it_with_nothing_between(eye: tuple[float, float, float], is_seen: bool) -> None:
     other = trimesh.creation.box((10.0, 10.0, 40.0)).apply_translation((0.0, 20.0, 15.0))
-    caster = RayCaster(trimesh.util.concatenate(trimesh.creation.box((10.0, 10.0, 10.0)), other))
+    both: trimesh.Trimesh = trimesh.creation.box((10.0, 10.0, 10.0)) + other
+    caster = RayCaster(both)
     top, up = np.array([[0.0, 0.0, 5.0]]), np.array([[0.0, 0.0, 1.0]])
     assert caster.can_see(top, up, np.array([eye])).tolist() == [is_seen]

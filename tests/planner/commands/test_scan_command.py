@@ -1,0 +1,178 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import emulator  # noqa: F401 - teaches pyserial the port emulator://
+from planner.__main__ import main
+from planner.arrays import FloatArray
+from planner.scan import shipped_scans
+
+SMALL = """
+[cell]
+workpiece_on_table = [0, 0, 80, 0, 0, 0]
+[workpiece]
+class = "cylinder"
+diameter_mm = 100
+height_mm = 100
+[path]
+pattern = "rings"
+bottom_margin_mm = 20
+scan_speed_mm_s = 25
+time_step_s = 0.5
+"""
+QUICK = ["--angles", "60", "--configuration", "LEFTY-ABOVE-NOFLIP"]
+EXACT = "[gears]\nbacklash_arcmin = 0.0\n"
+
+
+@pytest.fixture
+def scan_file(tmp_path: Path) -> str:
+    file = tmp_path / "small.toml"
+    file.write_text(SMALL)
+    return str(file)
+
+
+def scanned(folder: Path) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads((folder / "scan.json").read_text())
+    return document
+
+
+def cloud(folder: Path) -> FloatArray:
+    loaded = trimesh.load(folder / "cloud.ply")
+    assert isinstance(loaded, trimesh.PointCloud)
+    return np.asarray(loaded.vertices)
+
+
+@pytest.mark.parametrize("name", shipped_scans())
+def test_a_shipped_scan_gives_a_cloud_on_the_part_and_a_report(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["scan", name, *QUICK, "--rate", "5", "--out", str(tmp_path / "new")]) == 0
+    assert sorted(file.name for file in (tmp_path / "new").iterdir()) == ["cloud.ply", "report.html", "scan.json"]
+    document = scanned(tmp_path / "new")
+    assert 0.0 < document["distance_mm"]["sigma"] < 0.2
+    assert document["coverage"]["seen"] > 0.05
+    assert document["error_mm"]["all_off"] < 1e-9
+    assert len(cloud(tmp_path / "new")) == document["points"]
+    shown = capsys.readouterr()
+    assert f"{document['points']:,} points" in shown.out
+    assert shown.err == ""  # a pipe shows no progress
+    page = (tmp_path / "new" / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == 3
+    assert "<script" not in page
+    assert "http://" not in page
+    assert "https://" not in page
+
+
+def test_three_decimals_without_backlash_and_with_exact_calibration_lie_within_30_micrometres(
+    scan_file: str, tmp_path: Path
+) -> None:
+    (tmp_path / "table.toml").write_text(EXACT)
+    port = f"emulator://?config={tmp_path / 'table.toml'}"
+    options = ["--decimals", "3", "--exact-calibration", "--port", port, "--rate", "10"]
+    assert main(["scan", scan_file, *QUICK, *options, "--out", str(tmp_path)]) == 0
+    document = scanned(tmp_path)
+    assert 0.02 < document["distance_mm"]["sigma"] < 0.03
+    parts = document["error_mm"]["parts"]
+    assert parts["backlash"]["displacement_mm"] < 0.003  # to a count of the encoder
+
+
+def test_one_decimal_costs_what_the_closed_form_says(scan_file: str, tmp_path: Path) -> None:
+    assert main(["scan", scan_file, *QUICK, "--out", str(tmp_path)]) == 0
+    error = scanned(tmp_path)["error_mm"]
+    rounding = error["parts"]["rounding on the wire"]["displacement_mm"]
+    assert rounding == pytest.approx(error["rounding_in_closed_form"], rel=0.15)
+    assert error["radius_mm"] == pytest.approx(50.0, rel=0.01)
+
+
+def test_the_same_seed_gives_the_same_bytes_and_text_has_the_same_points(scan_file: str, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        assert main(["scan", scan_file, *QUICK, "--rate", "4", "--xyz", "--out", str(tmp_path / name)]) == 0
+    for file in (tmp_path / "a").iterdir():
+        assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes()
+    points = np.loadtxt(tmp_path / "a" / "cloud.xyz")
+    assert np.abs(points - cloud(tmp_path / "a")).max() < 1e-4
+
+
+def test_another_mesh_takes_the_place_of_the_scans(scan_file: str, tmp_path: Path) -> None:
+    part = trimesh.creation.cylinder(radius=49.0, height=100.0, sections=64).apply_translation((0.0, 0.0, 50.0))
+    part.export(tmp_path / "part.ply")
+    options = ["--rate", "4", "--mesh", str(tmp_path / "part.ply"), "--exact-calibration"]
+    assert main(["scan", scan_file, *QUICK, *options, "--out", str(tmp_path / "out")]) == 0
+    vertices = cloud(tmp_path / "out")
+    assert np.hypot(vertices[:, 0], vertices[:, 1]) == pytest.approx(49.0, abs=0.4)
+    assert scanned(tmp_path / "out")["mesh"] == "part.ply"
+
+
+def without_a_triangle() -> trimesh.Trimesh:
+    box = trimesh.creation.box((50.0, 50.0, 50.0))
+    return trimesh.Trimesh(box.vertices, box.faces[1:], process=False)
+
+
+def inside_out() -> trimesh.Trimesh:
+    box = trimesh.creation.box((50.0, 50.0, 50.0))
+    return trimesh.Trimesh(box.vertices, box.faces[:, ::-1], process=False)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "message"),
+    [
+        (without_a_triangle(), "the mesh is open"),
+        (inside_out(), "inside out"),
+        (trimesh.creation.box((0.05, 0.05, 0.05)), "is it in metres?"),
+        (trimesh.creation.box((600.0, 50.0, 50.0)), "must stay within the table's radius of 250 mm"),
+    ],
+)
+def test_a_mesh_that_cannot_be_meant_is_one_line_and_status_2(
+    mesh: trimesh.Trimesh, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mesh.export(tmp_path / "part.ply")
+    assert main(["scan", "cylinder", "--mesh", str(tmp_path / "part.ply"), "--out", str(tmp_path / "out")]) == 2
+    shown = capsys.readouterr()
+    assert message in shown.err
+    assert len(shown.err.splitlines()) == 1
+    assert shown.out == ""
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scan_that_meets_nothing_says_so_and_leaves_no_cloud(
+    scan_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    low = trimesh.creation.cylinder(radius=10.0, height=5.0).apply_translation((0.0, 0.0, 2.5))
+    low.export(tmp_path / "low.ply")
+    arguments = ["--mesh", str(tmp_path / "low.ply"), "--rate", "4", "--out", str(tmp_path / "out")]
+    assert main(["scan", scan_file, *QUICK, *arguments]) == 2
+    assert "meets the workpiece" in capsys.readouterr().err
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--port", "/dev/does-not-exist"], "cannot open"),
+        (["--port", "emulator://?seed=x"], "cannot open"),
+        (["--rate", "150"], "beyond the probe's 100"),
+        (["--configuration", "SIDEWAYS"], "no arm configuration"),
+        (["--configuration", "RIGHTY-BELOW-FLIP"], "there is no plan"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line_and_status_2(
+    arguments: list[str], message: str, scan_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["scan", scan_file, *QUICK, *arguments, "--out", str(tmp_path / "out")]) == 2
+    shown = capsys.readouterr()
+    assert message in shown.err
+    assert len(shown.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("option", [["--rate", "0"], ["--rate", "fast"], ["--decimals", "9"], ["--seed", "-1"]])
+def test_an_option_that_cannot_be_meant_is_refused(
+    option: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as exit_status:
+        main(["scan", "cylinder", *option, "--out", str(tmp_path)])
+    assert exit_status.value.code == 2
+    assert option[1] in capsys.readouterr().err

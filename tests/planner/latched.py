@@ -1,0 +1,51 @@
+"""Runs with latches, for tests: made up ones, and real ones on a table in simulated time."""
+
+from typing import Any
+
+import numpy as np
+
+import emulator  # noqa: F401 - teaches pyserial the port emulator://
+from planner.arrays import FloatArray
+from planner.cost import PathCost
+from planner.latched_run import LatchedRun, TriggerConditions, run_latched
+from planner.motion import Limits, roll_out
+from planner.plan import Plan
+from planner.stream import Wire
+from planner.table_port import open_port
+from planner.trigger_line import ProbeOnPort
+from protocol import TableClient
+
+LIMITS = Limits(40.0, 100.0)
+
+
+def swinging_plan(seconds: float = 4.0) -> Plan:
+    """Return a plan that turns one way and back."""
+    step_s = 0.5
+    count = int(seconds / step_s)
+    accelerations = np.array([10.0 if k < count // 4 else -10.0 if k < 3 * count // 4 else 10.0 for k in range(count)])
+    angles, speeds = roll_out(5.0, 0.0, accelerations, step_s)
+    return Plan("", "", step_s, angles, speeds, accelerations, PathCost(0.0, 0.0, 0.0, 0.0))
+
+
+def joints_along(plan: Plan) -> FloatArray:
+    """Return joints that say at which time they are: a degree a second."""
+    times_s = plan.step_s * np.arange(len(plan.angles_deg))
+    return np.tile(times_s[:, np.newaxis], (1, 6))
+
+
+def table_behind(port: object) -> Any:  # noqa: ANN401 - the planner knows nothing of its type
+    """Return the simulated table that a port carries."""
+    return port.table  # type: ignore[attr-defined] # only the port in simulated time has one
+
+
+def latched_run(
+    conditions: TriggerConditions, plan: Plan | None = None, decimals: int = 1, url: str = "emulator://"
+) -> LatchedRun:
+    """Return what was latched along a plan on a table of its own."""
+    plan, wire = plan or swinging_plan(), Wire(decimals)
+    port = open_port(f"{url}?decimals={decimals}", wire.baud, 0.5)
+    with TableClient(port, 0.5, decimals) as table:
+        line = ProbeOnPort(
+            table_behind(port), conditions.rate_hz, conditions.delay_s, conditions.faults, conditions.seed
+        )
+        return run_latched(table, line, plan, joints_along(plan), LIMITS, wire, conditions)
