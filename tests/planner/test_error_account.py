@@ -40,8 +40,9 @@ def made_up_chain(decimals: int, backlash_deg: float = 0.08, off_mm: float = 0.0
     latched_deg = np.asarray(np.floor((edge_deg - backlash_deg) * 512.0) / 512.0, dtype=np.float64)
     T_BF = CELL.goal_flange_poses(poses_round_the_block(), true_deg)[np.arange(PROFILES), np.arange(PROFILES)]
     numbers = np.tile(np.arange(PROFILES, dtype=np.float64)[:, np.newaxis], (1, 6))
+    times_s = np.linspace(0.0, 24.0, PROFILES)
     run = LatchedRun(
-        np.arange(PROFILES), 0.04 * np.arange(PROFILES), numbers, latched_deg.round(decimals), numbers,
+        np.arange(PROFILES), times_s, numbers, latched_deg.round(decimals), numbers,
         true_deg, edge_deg, latched_deg, True, PROFILES, {}, None,
     )  # fmt: skip
     known = replace(TRUE, T_FS=TRUE.T_FS @ placement(off_mm, 0.0, 0.0, 0.0, 0.0, 0.0))
