@@ -19,6 +19,9 @@ from planner.configuration import Configuration
 from planner.errors import PlannerError
 from planner.whole_file import whole_file
 
+MAP_FILE = "map.npz"
+"""The name of a map's file in a folder of results."""
+
 _FORMAT = "seventh-axis configuration maps"
 _FORMAT_VERSION = 1
 

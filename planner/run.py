@@ -8,9 +8,10 @@ from typing import NamedTuple
 from planner.execute import Settings, bring_to, execute
 from planner.free_way import check_ends, nearest_turns, turns_to_start
 from planner.inside_view import ControlView, InsideView, view_of
+from planner.map_file import MAP_FILE
 from planner.robot_motion import robot_motion
 from planner.run_file import RunConditions, StoredRun, copy_input, save_robot, save_run
-from planner.run_input import MAP_FILE, load_run_input
+from planner.run_input import load_run_input
 from planner.run_plots import plot_run
 from planner.run_verification import DEFAULT_TOLERANCE_DEG, RunVerification, verify_run
 from planner.stream import check_it_fits, stream

@@ -16,8 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planner.errors import PlannerError
+from planner.map_file import MAP_FILE
 from planner.robot_motion import RobotMotion
-from planner.run_input import MAP_FILE, RunInput, load_run_input
+from planner.run_input import RunInput, load_run_input
 from planner.run_record import Correction, Observation, Record, Sent
 from planner.run_verification import RunVerification
 from planner.table_motion import PauseTimes, Phase, TableMotion

@@ -11,14 +11,13 @@ from planner.arrays import FloatArray
 from planner.configuration import Configuration
 from planner.cost import Weights
 from planner.errors import PlannerError
-from planner.map_file import load_maps
+from planner.map_file import MAP_FILE, load_maps
 from planner.motion import Limits, next_angle, next_speed
 from planner.plan import Plan
 from planner.plan_file import load_plan
 from planner.problem import Problem
 from planner.verification import verify
 
-MAP_FILE = "map.npz"
 _ROUNDING = 1e-6
 
 

@@ -45,10 +45,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def scan_on_a_pty(out: Path) -> int:
     """Plan, run, verify and show the scan; return the first exit status that is not 0."""
-    for command in (["map", SCAN, "--out", str(out)], ["plan", SCAN, "--out", str(out)]):
-        _say(f"python -m planner {' '.join(command)}")
-        if status := planner(command):
-            return status
+    command = ["plan", SCAN, "--out", str(out)]
+    _say(f"python -m planner {' '.join(command)}")
+    if status := planner(command):
+        return status
     # The path of a socket must be short, that of `out` may not be.
     with tempfile.TemporaryDirectory() as folder:
         control = str(Path(folder) / "control")

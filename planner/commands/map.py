@@ -10,7 +10,7 @@ from planner.config_map import ConfigurationMap
 from planner.configuration import Configuration
 from planner.errors import PlannerError
 from planner.map_builder import build_maps
-from planner.map_file import save_maps
+from planner.map_file import MAP_FILE, save_maps
 from planner.map_plots import plot_map, plot_map_cylinder
 from planner.map_problem import map_problem
 from planner.progress import progress_line
@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     out: Path = arguments.out
     try:
         out.mkdir(parents=True, exist_ok=True)
-        save_maps(out / "map.npz", maps)
+        save_maps(out / MAP_FILE, maps)
         plot_map(maps[drawn], out / "map.png")
         plot_map_cylinder(maps[drawn], out / "map_cylinder.png")
     except OSError as error:

@@ -16,6 +16,7 @@ from planner.configuration import Configuration
 from planner.errors import PlannerError
 from planner.joint_path import JointPath
 from planner.map_builder import build_maps
+from planner.map_file import MAP_FILE, save_maps
 from planner.map_problem import map_problem
 from planner.plan import NoPlan, Outcome, Plan
 from planner.plan_file import plan_document, save_plan
@@ -52,7 +53,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )
     parser.add_argument("--smooth", action="store_true", help="lower the plan's acceleration peaks afterwards")
     parser.add_argument("--compare", action="store_true", help="run all planners and print a table of them")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for plan.json and plan.png")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="folder for plan.json, plan.png and the map"
+    )
     parser.set_defaults(run=run)
 
 
@@ -67,7 +70,7 @@ def _angle(text: str) -> float:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write `plan.json` and `plan.png`, print cost, time and margins, and return the exit status."""
+    """Write `plan.json`, `map.npz` and `plan.png`, print cost, time and margins, and return the exit status."""
     best = arguments.configuration == "best"
     asked = list(Configuration) if best else [Configuration.parse(arguments.configuration)]
     scan = load_scan(arguments.scan)
@@ -175,6 +178,7 @@ def _write(out: Path, scan: Scan, problem: Problem, plan: Plan, joints: JointPat
     try:
         out.mkdir(parents=True, exist_ok=True)
         save_plan(out / "plan.json", plan_document(scan, problem, plan, joints))
+        save_maps(out / MAP_FILE, {Configuration.parse(plan.configuration): problem.map})
         plot_plan(problem, plan, f"{scan.name}   {plan.configuration}   {plan.planner}", out / "plan.png")
     except OSError as error:
         raise PlannerError(f"{out}: the plan cannot be written there ({error.strerror or error})") from error
