@@ -3,7 +3,7 @@
 Nothing is measured here yet; this is the part that needs the table, and it ends with one row for each profile.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from planner.arrays import FloatArray
 from planner.errors import PlannerError
-from planner.execute import Settings, bring_to, execute
+from planner.execute import Record, Settings, bring_to, execute
 from planner.latching import Drop, RobotLatch, TableReading, Tolerances, Trigger, pair
 from planner.motion import Limits
 from planner.plan import Plan
@@ -149,12 +149,7 @@ def run_latched(
     robot = robot_motion(motion, joints_deg)
     latch_times_s, _ = robot_latch_times_s(times_s, conditions.delay_s, conditions.faults, conditions.seed)
     triggers = [Trigger(k, time_s) for k, time_s in enumerate(times_s.tolist()) if motion.is_scanning(time_s)]
-    arrival_s = wire.seconds(2)
-    readings = [
-        TableReading(each.time_s, each.time_s + arrival_s + wire.turnaround_s + wire.latency_s, each.encoder_deg)
-        for each in record.observations
-        if each.source == "L"
-    ]
+    readings = list(_readings(record, wire))
     lag_s = settings.lag_s - settings.lead_s
     pairing = pair(
         triggers,
@@ -184,6 +179,16 @@ def run_latched(
         pairing.dropped,
         record.failure,
     )
+
+
+def _readings(record: Record, wire: Wire) -> Iterator[TableReading]:
+    """Yield the answers to `L`; the table is looked at between the trigger and the question."""
+    on_the_way_s = wire.seconds(2) + wire.turnaround_s + wire.latency_s
+    looked_s = {each.column: each.time_s for each in record.observations if each.source == "inside"}
+    for each in record.observations:
+        if each.source == "L":
+            asked_s = looked_s.get(each.column, each.time_s)
+            yield TableReading(asked_s, asked_s + on_the_way_s, each.encoder_deg)
 
 
 def _joints_at(robot: RobotMotion, times_s: FloatArray) -> FloatArray:

@@ -45,15 +45,16 @@ def scan_report(scanned: Scanned) -> str:
 
 def verdict_of(scanned: Scanned) -> str:
     """Return what a scan came to in one sentence."""
-    distances = scanned.account.distances
+    accounted, seen = scanned.account, scanned.coverage.shares()[Sight.SEEN]
     ended = ""
     if scanned.run.failure is not None:
         ended = f" It ended early: {scanned.run.failure}."
     elif scanned.is_interrupted:
         ended = " It was interrupted."
     return (
-        f"{scanned.points:,} points from {len(scanned.run.numbers):,} profiles, {_um(distances.sigma)} µm (1 sigma)"
-        f" from the surface; {scanned.coverage.shares()[Sight.SEEN]:.1%} of the surface seen.{ended}"
+        f"{scanned.points:,} points from {len(scanned.run.numbers):,} profiles: {_um(accounted.distances.sigma)} µm"
+        f" (1 sigma) from the surface, {_um(accounted.total.displacement_mm)} µm (rms) from where they truly lie;"
+        f" {seen:.1%} of the surface seen.{ended}"
     )
 
 

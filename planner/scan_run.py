@@ -63,6 +63,7 @@ class ScanOptions(NamedTuple):
     decimals: int = 1
     timeout_s: float = 0.5
     control: Path | None = None
+    time_scale: float = 1.0
     configuration: str = "best"
     angle_count: int = 360
     exact_calibration: bool = False
@@ -165,15 +166,16 @@ def run_on_port(planned: Planned, options: ScanOptions, progress: Progress) -> L
         TableError: The table does not answer, or did not come to the start.
     """
     wire = Wire(options.decimals, options.baud)
-    port = open_port(options.port, options.baud, options.timeout_s)
-    with TableClient(port, options.timeout_s, options.decimals) as table:
-        line = _trigger_line(port, table, options)
+    port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
+    with ExitStack() as open_things:
+        table = open_things.enter_context(TableClient(port, options.timeout_s, options.decimals))
+        line = _trigger_line(port, table, options, open_things)
         return run_latched(
             table, line, planned.plan, planned.joints_deg, planned.limits, wire, options.triggers, progress("motion")
         )
 
 
-def _trigger_line(port: object, table: TableClient, options: ScanOptions) -> TriggerLine:
+def _trigger_line(port: object, table: TableClient, options: ScanOptions, open_things: ExitStack) -> TriggerLine:
     simulated = getattr(port, "table", None)
     conditions = options.triggers
     if simulated is not None:
@@ -183,7 +185,9 @@ def _trigger_line(port: object, table: TableClient, options: ScanOptions) -> Tri
             f"{options.port}: the simulated probe has no line to trigger this table;"
             " use emulator://, or a stand-in with its --control channel"
         )
-    return ProbeByHand(ControlView(options.control), table.clock)
+    view = ControlView(options.control)
+    open_things.callback(view.close)
+    return ProbeByHand(view, table.clock)
 
 
 def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: Progress) -> Scanned:

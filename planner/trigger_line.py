@@ -179,8 +179,9 @@ class ProbeByHand:
 
     def look(self) -> Look:
         """Return where the table is at this moment."""
+        look = self._view.look()
         self.looked_s.append(self._clock.now_s())
-        return self._view.look()
+        return look
 
     def trigger(self) -> None:
         """Take a profile."""

@@ -34,12 +34,15 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="emulator:// for a table in simulated time (the default), or a stand-in's port along with --control",
     )  # fmt: skip
     parser.add_argument("--control", type=Path, metavar="PATH", help="the control channel of a stand-in at --port")
+    parser.add_argument(
+        "--time-scale", type=_positive, default=1.0, metavar="X", help="that of the stand-in at --port, if it is not 1"
+    )
     parser.add_argument("--baud", type=_whole(0, 1_000_000), default=9600, metavar="N", help="default 9600")
     parser.add_argument(
         "--decimals", type=_whole(0, 6), default=1, metavar="N", help="places after the point on the wire (default 1)"
     )
     parser.add_argument(
-        "--rate", type=_rate, default=TriggerConditions().rate_hz, metavar="HZ",
+        "--rate", type=_positive, default=TriggerConditions().rate_hz, metavar="HZ",
         help="profiles a second (default %(default)g)",
     )  # fmt: skip
     parser.add_argument(
@@ -69,6 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
         baud=arguments.baud,
         decimals=arguments.decimals,
         control=arguments.control,
+        time_scale=arguments.time_scale,
         configuration=arguments.configuration,
         angle_count=arguments.angles,
         exact_calibration=arguments.exact_calibration,
@@ -138,11 +142,11 @@ def _whole(least: int, most: int) -> "type[int]":
     return number  # type: ignore[return-value] # argparse takes any function
 
 
-def _rate(text: str) -> float:
+def _positive(text: str) -> float:
     try:
-        rate = float(text)
+        number = float(text)
     except ValueError:
-        rate = 0.0
-    if not 0.0 < rate <= 1000.0:
+        number = 0.0
+    if not 0.0 < number <= 1000.0:
         raise argparse.ArgumentTypeError(f"is {text}; allowed is a number above 0 and at most 1000")
-    return rate
+    return number
