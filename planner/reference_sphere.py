@@ -68,7 +68,7 @@ def sweep(
     return Sweep(poses @ rigid_inverse(T_FS), points)
 
 
-def views_of(centre_B: FloatArray, count: int, stand_off_mm: float = 150.0) -> FloatArray:
+def views_of(centre_B: FloatArray, count: int, probe: LaserProbe) -> FloatArray:
     """Return probe poses `(count, 4, 4)` all round the upper side of a sphere, turned about their beams as well.
 
     The sphere is off the line's middle and at varying depth: always in the middle, the probe turned round about its
@@ -79,7 +79,8 @@ def views_of(centre_B: FloatArray, count: int, stand_off_mm: float = 150.0) -> F
     normals = np.column_stack((np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)))
     roll = np.radians(77.0 * number)
     lines = np.column_stack((np.cos(roll), np.sin(roll), 0.3 * np.ones(count)))
-    depths_mm = stand_off_mm + 20.0 * np.cos(2.0 * number)
+    middle_mm, span_mm = 0.5 * (probe.nearest_mm + probe.farthest_mm), probe.farthest_mm - probe.nearest_mm
+    depths_mm = middle_mm + 0.2 * span_mm * np.cos(2.0 * number)
     poses = looking_at(np.tile(centre_B, (count, 1)), normals, lines, 0.0)
     poses[:, :3, 3] += (depths_mm + _RADIUS_MM)[:, np.newaxis] * normals
     poses[:, :3, 3] += 10.0 * np.where(number % 3, 1.0, -1.0)[:, np.newaxis] * poses[:, :3, 0]
@@ -97,14 +98,14 @@ def calibrate_cell(true: Calibration, nominal: Calibration, probe: LaserProbe, s
     """
     rng = np.random.default_rng((seed, 8))
     centre = (true.T_BT @ np.array((*_SEAT_T_MM, 1.0)))[:3]
-    seen = sweep(probe, views_of(centre, 20), true.T_FS, centre, rng)
+    seen = sweep(probe, views_of(centre, 20, probe), true.T_FS, centre, rng)
     on_flange = calibrate_probe(seen.T_BF, seen.points_S, _RADIUS_MM, nominal.T_FS, 3.0 * max(probe.noise_mm, 1e-3))
 
     angles_deg = np.arange(_TABLE_ANGLES) * 360.0 / _TABLE_ANGLES
     centres = []
     for T_turn in rotations_z(angles_deg):
         turned = (true.T_BT @ T_turn @ np.array((*_SEAT_T_MM, 1.0)))[:3]
-        views = sweep(probe, views_of(turned, 3), true.T_FS, turned, rng)
+        views = sweep(probe, views_of(turned, 3, probe), true.T_FS, turned, rng)
         T_BS = views.T_BF @ on_flange.T_FS
         in_base = [points @ T[:3, :3].T + T[:3, 3] for T, points in zip(T_BS, views.points_S, strict=True)]
         centres.append(sphere_centre(np.concatenate(in_base), _RADIUS_MM))

@@ -65,7 +65,7 @@ def swept(views: FloatArray) -> FloatArray:
 
 
 def test_a_false_minimum_is_met_and_not_taken() -> None:
-    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8)))
+    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8, LaserProbe())))
     wrong_starts = 0
     for turned in list(cube_turns(TRUE.T_FS))[::5]:
         found = calibrate_probe(T_BF, points, RADIUS_MM, turned)
@@ -76,7 +76,7 @@ def test_a_false_minimum_is_met_and_not_taken() -> None:
 
 
 def test_without_noise_the_fit_is_exact() -> None:
-    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8)), noise_mm=0.0)
+    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8, LaserProbe())), noise_mm=0.0)
     assert off(calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS).T_FS, TRUE.T_FS) == pytest.approx((0, 0), abs=1e-6)
 
 
@@ -88,18 +88,18 @@ def test_the_24_turns_of_a_cube_are_different_and_proper() -> None:
 
 
 def moved_sphere() -> object:
-    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8)))
+    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8, LaserProbe())))
     T_BF[10:, 0, 3] += 0.7
     return calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
 
 
 def another_sphere() -> object:
-    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8)))
+    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8, LaserProbe())))
     return calibrate_probe(T_BF, points, 12.7, TRUE.T_FS)
 
 
 def always_in_the_middle() -> object:
-    views = views_of(CENTRE, 8)
+    views = views_of(CENTRE, 8, LaserProbe())
     beams = views[:, :3, 2]
     views[:, :3, 3] = CENTRE - 165.0 * beams
     T_BF, points = seen_from(TRUE.T_FS, swept(views))
@@ -107,18 +107,18 @@ def always_in_the_middle() -> object:
 
 
 def always_the_same_direction() -> object:
-    one = views_of(CENTRE, 8)[:1]
+    one = views_of(CENTRE, 8, LaserProbe())[:1]
     T_BF, points = seen_from(TRUE.T_FS, swept(np.repeat(one, 3, axis=0)))
     return calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
 
 
 def too_few_views() -> object:
-    T_BF, points = seen_from(TRUE.T_FS, views_of(CENTRE, 5))
+    T_BF, points = seen_from(TRUE.T_FS, views_of(CENTRE, 5, LaserProbe()))
     return calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
 
 
 def an_empty_view() -> object:
-    T_BF, points = seen_from(TRUE.T_FS, views_of(CENTRE, 8))
+    T_BF, points = seen_from(TRUE.T_FS, views_of(CENTRE, 8, LaserProbe()))
     points[3] = points[3][:2]
     return calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
 

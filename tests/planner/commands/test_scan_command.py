@@ -139,12 +139,15 @@ def test_a_mesh_that_cannot_be_meant_is_one_line_and_status_2(
 
 
 def test_a_scan_that_meets_nothing_says_so_and_leaves_no_cloud(
-    scan_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    low = trimesh.creation.cylinder(radius=10.0, height=5.0).apply_translation((0.0, 0.0, 2.5))
-    low.export(tmp_path / "low.ply")
-    arguments = ["--mesh", str(tmp_path / "low.ply"), "--rate", "4", "--out", str(tmp_path / "out")]
-    assert main(["scan", scan_file, *QUICK, *arguments]) == 2
+    scan_file = tmp_path / "short.toml"
+    scan_file.write_text(SMALL.replace("[workpiece]", "[cell.probe]\nfarthest_mm = 155\n[workpiece]"))
+    # Its surface is 40 mm behind that of the cylinder which the path is made for.
+    thin = trimesh.creation.cylinder(radius=10.0, height=100.0, sections=16).apply_translation((0.0, 0.0, 50.0))
+    thin.export(tmp_path / "thin.ply")
+    arguments = ["--mesh", str(tmp_path / "thin.ply"), "--rate", "4", "--out", str(tmp_path / "out")]
+    assert main(["scan", str(scan_file), *QUICK, *arguments]) == 2
     assert "meets the workpiece" in capsys.readouterr().err
     assert list((tmp_path / "out").iterdir()) == []
 
