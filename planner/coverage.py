@@ -6,12 +6,15 @@ cloud's density. A point that was never measured keeps the condition that it cam
 """
 
 import numpy as np
+import numpy.typing as npt
 import trimesh
 
 from planner.arrays import FloatArray
 from planner.probe import CodeArray, LaserProbe, Sight, sight
 from planner.ray_casting import RayCaster
 from planner.transforms import rigid_inverse
+
+IndexArray = npt.NDArray[np.int64]
 
 SAMPLES = 5000
 
@@ -64,7 +67,7 @@ class Coverage:
         codes[struck[hidden]] = Sight.OCCLUDED
         np.maximum.at(self.codes, sample, codes)
 
-    def _passed_over(self, T_WS: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _passed_over(self, T_WS: FloatArray, points: FloatArray) -> tuple[IndexArray, IndexArray, FloatArray]:
         """Return which profiles pass over which points (indices), and at what depth."""
         T_SW = rigid_inverse(T_WS)
         across = points @ T_SW[:, 1, :3].T + T_SW[:, 1, 3]  # y in frame S, (m, n)

@@ -147,7 +147,7 @@ def run_latched(
     times_s = line.times_s() - origin_s
 
     robot = robot_motion(motion, joints_deg)
-    latch_times_s, _ = robot_latch_times_s(times_s, conditions.delay_s, conditions.faults, conditions.seed)
+    latch_times_s = robot_latch_times_s(times_s, conditions.delay_s, conditions.faults, conditions.seed)
     triggers = [Trigger(k, time_s) for k, time_s in enumerate(times_s.tolist()) if motion.is_scanning(time_s)]
     readings = list(_readings(record, wire))
     lag_s = settings.lag_s - settings.lead_s

@@ -19,8 +19,8 @@ from planner.arrays import FloatArray
 from planner.best_configuration import best_configuration
 from planner.calibration import AxisCalibration, ProbeCalibration
 from planner.cell import Cell, placement
-from planner.commands.plan import problem_of
 from planner.configuration import Configuration
+from planner.cost import Weights
 from planner.coverage import Coverage
 from planner.error_account import Account, Chain, Samples, account
 from planner.errors import PlannerError, WorkpieceError
@@ -34,6 +34,7 @@ from planner.plan import Plan
 from planner.planners import DEFAULT_PLANNER, PLANNERS
 from planner.point_cloud import PlyWriter, XyzWriter
 from planner.probe import LaserProbe, measure
+from planner.problem import Problem
 from planner.ray_casting import RayCaster
 from planner.reference_sphere import calibrate_cell
 from planner.scan import Scan
@@ -146,7 +147,9 @@ def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: Progre
     """
     asked = list(Configuration) if configuration == "best" else [Configuration.parse(configuration)]
     maps = build_maps(map_problem(scan, progress("distance field")), asked, angle_count, progress("map"))
-    problems = {each.label: problem_of(scan, map_, None) for each, map_ in maps.items()}
+    limits = Limits(scan.limits.speed_deg_s, scan.limits.acceleration_deg_s2)
+    weights = Weights(scan.weights.k_a, scan.weights.k_w)
+    problems = {each.label: Problem(map_, scan.path.step_s, limits, weights) for each, map_ in maps.items()}
     comparison = best_configuration(problems, PLANNERS[DEFAULT_PLANNER])
     if comparison.best is None:
         raise ScanError(f"{scan.name}: there is no plan; python -m planner plan {scan.name} tells why")
@@ -155,7 +158,7 @@ def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: Progre
     joints = arm_motion(scan, Configuration.parse(comparison.best), plan)
     if joints.step is not None:
         raise ScanError(f"{scan.name}: the arm cannot follow the plan at location {joints.step}; scan it more slowly")
-    return Planned(plan, np.degrees(joints.joints), problems[comparison.best].limits)
+    return Planned(plan, np.degrees(joints.joints), limits)
 
 
 def run_on_port(planned: Planned, options: ScanOptions, progress: Progress) -> LatchedRun:

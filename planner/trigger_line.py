@@ -11,7 +11,6 @@ from itertools import count
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from planner.arrays import FloatArray
 from planner.inside_view import InsideView, Look, PortView
@@ -199,10 +198,8 @@ class ProbeByHand:
         """Return nothing: by the time a look comes back, the table has moved on."""
 
 
-def robot_latch_times_s(
-    times_s: FloatArray, delay_s: float, faults: TriggerFaults, seed: int
-) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """Return when the robot latches, `(m,)` ascending, and the trigger that each belongs to, -1 for none.
+def robot_latch_times_s(times_s: FloatArray, delay_s: float, faults: TriggerFaults, seed: int) -> FloatArray:
+    """Return when the robot latches, `(m,)` ascending.
 
     Args:
         times_s: `(n,)` of the triggers.
@@ -211,8 +208,7 @@ def robot_latch_times_s(
         seed: Chooses these times.
     """
     delays_s = delay_s * np.random.default_rng((seed, 6)).random(len(times_s))
-    heard = [(time_s + delays_s[k], k) for k, time_s in enumerate(times_s) if k not in faults.robot_misses]
+    heard = [time_s + delays_s[k] for k, time_s in enumerate(times_s) if k not in faults.robot_misses]
     period_s = float(np.median(np.diff(times_s))) if len(times_s) > 1 else 0.0
-    heard += [(times_s[k] + 0.5 * period_s, -1) for k in faults.robot_doubles if k < len(times_s)]
-    heard.sort()
-    return np.array([at for at, _ in heard]), np.array([number for _, number in heard], dtype=np.int64)
+    heard += [times_s[k] + 0.5 * period_s for k in faults.robot_doubles if k < len(times_s)]
+    return np.array(sorted(heard))

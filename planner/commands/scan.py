@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from planner.commands.map import angle_count
@@ -129,7 +130,7 @@ def _port(url: str, decimals: int, seed: int) -> str:
     return "emulator://?" + "&".join(([told] if told else []) + wanted)
 
 
-def _whole(least: int, most: int) -> "type[int]":
+def _whole(least: int, most: int) -> Callable[[str], int]:
     def number(text: str) -> int:
         try:
             value = int(text)
@@ -139,7 +140,7 @@ def _whole(least: int, most: int) -> "type[int]":
             raise argparse.ArgumentTypeError(f"is {text}; allowed is a whole number from {least} to {most}")
         return value
 
-    return number  # type: ignore[return-value] # argparse takes any function
+    return number
 
 
 def _positive(text: str) -> float:

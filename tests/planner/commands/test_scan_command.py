@@ -9,7 +9,10 @@ import trimesh
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.__main__ import main
 from planner.arrays import FloatArray
-from planner.scan import shipped_scans
+from planner.scan import load_scan, shipped_scans
+from planner.scan_file import scan_document
+from planner.scan_report import scan_report
+from planner.scan_run import ScanOptions, scan_workpiece
 
 SMALL = """
 [cell]
@@ -105,6 +108,22 @@ def test_another_mesh_takes_the_place_of_the_scans(scan_file: str, tmp_path: Pat
     vertices = cloud(tmp_path / "out")
     assert np.hypot(vertices[:, 0], vertices[:, 1]) == pytest.approx(49.0, abs=0.4)
     assert scanned(tmp_path / "out")["mesh"] == "part.ply"
+
+
+def test_ctrl_c_while_profiles_are_measured_keeps_what_was_scanned(scan_file: str, tmp_path: Path) -> None:
+    def stop_at_once(done: int, total: int) -> None:
+        assert done < total
+        raise KeyboardInterrupt
+
+    options = ScanOptions(configuration="LEFTY-ABOVE-NOFLIP", angle_count=60, exact_calibration=True)
+    result = scan_workpiece(
+        load_scan(scan_file), options, tmp_path, lambda label: stop_at_once if label == "profiles" else None
+    )
+    assert result.is_interrupted
+    assert not result.is_whole
+    assert 0 < result.points == len(cloud(tmp_path)) < 640 * len(result.run.numbers)
+    assert "interrupted" in scan_report(result)
+    assert scan_document(result)["failure"] == "interrupted"
 
 
 def without_a_triangle() -> trimesh.Trimesh:
