@@ -7,9 +7,10 @@ import numpy as np
 
 from planner.alignment import Calibration
 from planner.arrays import FloatArray
-from planner.calibration import AxisCalibration, ProbeCalibration, calibrate_probe, calibrate_table_axis, sphere_centre
+from planner.calibration import AxisCalibration, calibrate_table_axis, sphere_centre
 from planner.cell import placement
 from planner.probe import LaserProbe
+from planner.probe_calibration import ProbeCalibration, calibrate_probe
 from planner.scan_path import looking_at
 from planner.transforms import rigid_inverse, rotations_z
 

@@ -17,7 +17,7 @@ from planner.alignment import Calibration, aligned, probe_poses
 from planner.arm_motion import arm_motion
 from planner.arrays import FloatArray
 from planner.best_configuration import best_configuration
-from planner.calibration import AxisCalibration, ProbeCalibration
+from planner.calibration import AxisCalibration
 from planner.cell import Cell, placement
 from planner.configuration import Configuration
 from planner.cost import Weights
@@ -34,6 +34,7 @@ from planner.plan import Plan
 from planner.planners import DEFAULT_PLANNER, PLANNERS
 from planner.point_cloud import PlyWriter, XyzWriter
 from planner.probe import LaserProbe, measure
+from planner.probe_calibration import ProbeCalibration
 from planner.problem import Problem
 from planner.ray_casting import RayCaster
 from planner.reference_sphere import calibrate_cell

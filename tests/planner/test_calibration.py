@@ -6,9 +6,10 @@ from scipy.spatial.transform import Rotation
 
 from planner.alignment import Calibration
 from planner.arrays import FloatArray
-from planner.calibration import CalibrationError, calibrate_probe, calibrate_table_axis, cube_turns, sphere_centre
+from planner.calibration import CalibrationError, calibrate_table_axis, sphere_centre
 from planner.cell import Cell, placement
 from planner.probe import LaserProbe
+from planner.probe_calibration import calibrate_probe, cube_turns
 from planner.reference_sphere import calibrate_cell, profile_of_sphere, views_of
 from planner.transforms import rigid_inverse, rotations_z
 
