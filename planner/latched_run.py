@@ -13,14 +13,15 @@ import numpy.typing as npt
 
 from planner.arrays import FloatArray
 from planner.errors import PlannerError
-from planner.execute import Record, Settings, bring_to, execute
+from planner.execute import Settings, bring_to, execute
 from planner.latching import Drop, RobotLatch, TableReading, Tolerances, Trigger, pair
 from planner.motion import Limits
 from planner.plan import Plan
 from planner.robot_motion import RobotMotion, robot_motion
-from planner.stream import Wire
+from planner.run_record import Record
 from planner.table_motion import Phase, TableMotion
 from planner.trigger_line import TriggerFaults, TriggerLine, robot_latch_times_s
+from planner.wire import Wire
 from protocol import TableClient
 
 # The first profile comes when the first command has been sent.

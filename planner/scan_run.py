@@ -39,9 +39,9 @@ from planner.problem import Problem
 from planner.ray_casting import RayCaster
 from planner.reference_sphere import calibrate_cell
 from planner.scan import Scan
-from planner.stream import Wire
 from planner.table_port import open_port
 from planner.trigger_line import ProbeByHand, ProbeOnPort, TriggerLine
+from planner.wire import Wire
 from protocol import TableClient
 
 # Profiles that are measured at once: some 40 000 points.

@@ -139,10 +139,11 @@ class Wire:
         self.port.open()
 
     def _receive(self, timeout_s: float) -> bool:
-        """Wait for a byte; return False when none came in time."""
-        if timeout_s <= 0.0:
-            return False
-        self.port.timeout = timeout_s
+        """Wait for a byte, or look whether one is there when time is up; return False when none came.
+
+        A busy machine may keep this program from a byte that was in time.
+        """
+        self.port.timeout = max(timeout_s, 0.0)
         data = self.port.read(1)
         self._rest += data
         self._times += [self.clock.now_s()] * len(data)

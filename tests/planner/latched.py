@@ -10,9 +10,9 @@ from planner.cost import PathCost
 from planner.latched_run import LatchedRun, TriggerConditions, run_latched
 from planner.motion import Limits, roll_out
 from planner.plan import Plan
-from planner.stream import Wire
 from planner.table_port import open_port
 from planner.trigger_line import ProbeOnPort
+from planner.wire import Wire
 from protocol import TableClient
 
 LIMITS = Limits(40.0, 100.0)

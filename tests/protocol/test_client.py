@@ -434,3 +434,17 @@ def say_and_check(client: TableClient, port: TablePort, what: str) -> None:
                 client.move_to(2000)
             if not isinstance(refusal.value, CommandRefused):
                 raise refusal.value
+
+
+class StarvedClock(VirtualClock):
+    """The clock of a program that gets the processor back two seconds after each look at it."""
+
+    def now_s(self) -> float:
+        self.time_s += 2.0
+        return self.time_s
+
+
+def test_a_reply_that_is_there_counts_however_late_the_client_looks() -> None:
+    port = TablePort()
+    port.clock = StarvedClock()
+    assert TableClient(port, timeout_s=1.0).position_deg() > 0.0
