@@ -20,7 +20,6 @@ from planner.best_configuration import best_configuration
 from planner.calibration import AxisCalibration
 from planner.cell import Cell, placement
 from planner.configuration import Configuration
-from planner.cost import Weights
 from planner.coverage import Coverage
 from planner.error_account import Account, Chain, Samples, account
 from planner.errors import PlannerError, WorkpieceError
@@ -148,8 +147,8 @@ def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: Progre
     """
     asked = list(Configuration) if configuration == "best" else [Configuration.parse(configuration)]
     maps = build_maps(map_problem(scan, progress("distance field")), asked, angle_count, progress("map"))
-    limits = Limits(scan.limits.speed_deg_s, scan.limits.acceleration_deg_s2)
-    weights = Weights(scan.weights.k_a, scan.weights.k_w)
+    limits = scan.limits
+    weights = scan.weights
     problems = {each.label: Problem(map_, scan.path.step_s, limits, weights) for each, map_ in maps.items()}
     comparison = best_configuration(problems, PLANNERS[DEFAULT_PLANNER])
     if comparison.best is None:
