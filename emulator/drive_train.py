@@ -172,17 +172,24 @@ def _free(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm
     closing = gap - gap_before
     share = (contact * train.half_gap_rad - gap_before) / closing if contact * closing > 0.0 else 0.0
     share = min(max(share, 0.0), 1.0)
-    common_speed = _common_speed(train, train.driving.inertia_kg_m2, speed, table_speed)
-    if contact * (speed + common_speed) <= 0.0:  # it is the table that did work on the motor
-        common_speed = _common_speed(train, train.overhauling.inertia_kg_m2, speed, table_speed)
+    common_speed = _speed_after_impact(train, contact, speed, table_speed * train.ratio)
     angle = state.angle_rad + share * (angle - state.angle_rad) + (1.0 - share) * train.tick_s * common_speed
     return _together(train, current, common_speed, angle, contact)
 
 
-def _common_speed(train: DriveTrain, inertia_kg_m2: float, speed_rad_s: float, table_speed_rad_s: float) -> float:
-    """Return the motor's speed after the teeth have met: momentum is kept, with the table as the motor feels it."""
-    momentum = train.motor_inertia_kg_m2 * speed_rad_s + inertia_kg_m2 * train.ratio * table_speed_rad_s
-    return momentum / (train.motor_inertia_kg_m2 + inertia_kg_m2)
+def _speed_after_impact(train: DriveTrain, contact: int, speed: float, table_speed: float) -> float:
+    """Return the common speed of motor and table, at the motor, after they have met on a flank.
+
+    The impulse through the teeth pays for the gears' losses on the side that it drives: on the table's while the motor
+    still turns towards the flank, from then on, if the table throws it back, on the motor's.
+    """
+    motor, driven, driving = train.motor_inertia_kg_m2, train.driving.inertia_kg_m2, train.overhauling.inertia_kg_m2
+    if contact * speed > 0.0:
+        momentum = motor * speed + driven * table_speed
+        if contact * momentum >= 0.0:
+            return momentum / (motor + driven)
+        speed, table_speed = 0.0, momentum / driven
+    return (motor * speed + driving * table_speed) / (motor + driving)
 
 
 def _free_motor(train: DriveTrain, state: DriveState, voltage_V: float) -> tuple[float, float, float]:

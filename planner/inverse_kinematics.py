@@ -65,7 +65,7 @@ def _first_limit(arm: FloatArray, joints: FloatArray, slot: int) -> int:
 
 
 @kernel
-def _solve_wrist(  # noqa: PLR0917 - kernels take numbers and arrays, not objects
+def _solve_wrist(
     arm: FloatArray,
     T_BF: FloatArray,
     c1: float,
@@ -107,54 +107,6 @@ def _solve_wrist(  # noqa: PLR0917 - kernels take numbers and arrays, not object
     joints[slot + 1, 4] = _nearest_turn(arm, 4, joint_5)
     joints[slot + 1, 5] = _nearest_turn(arm, 5, joint_6)
     return aligned
-
-
-@kernel
-def _solve_elbows(  # noqa: PLR0917 - kernels take numbers and arrays, not objects
-    arm: FloatArray,
-    T_BF: FloatArray,
-    joint_1: float,
-    plane_x: float,
-    drop: float,
-    singular: bool,
-    joints: FloatArray,
-    reasons: CodeArray,
-    side: int,
-) -> None:
-    """Write the four solutions on one side, from slot `side` on (LEFTY 0, RIGHTY 4).
-
-    The wrist centre lies in the plane that joint 1 turns: `plane_x` from axis 1, and `drop` below joint 2.
-    """
-    a1, a2, a3, d4 = arm[0, A_MM], arm[1, A_MM], arm[2, A_MM], arm[3, D_MM]
-    ahead = plane_x - a1
-    span2 = ahead * ahead + drop * drop
-    forearm2 = a3 * a3 + d4 * d4
-    forearm = math.sqrt(forearm2)
-    cos_elbow = (span2 - a2 * a2 - forearm2) / (2.0 * a2 * forearm)
-    if not -1.0 <= cos_elbow <= 1.0:
-        _mark_out_of_reach(joints, reasons, side, side + 4)
-        return
-    along = a2 + forearm * cos_elbow
-    across = forearm * math.sqrt((1.0 - cos_elbow) * (1.0 + cos_elbow))
-    elbow, stretched = math.acos(cos_elbow), math.atan2(d4, a3)
-    to_wrist, off_wrist = math.atan2(drop, ahead), math.atan2(across, along)
-    c1, s1 = math.cos(joint_1), math.sin(joint_1)
-    # With all twists negated, joints 2, 3 and 5 turn the other way round and nothing else changes.
-    sense = -arm[0, SIN_ALPHA]
-    for below in range(2):
-        slot = side + 2 * below
-        # The forearm bends down from the upper arm for LEFTY ABOVE and RIGHTY BELOW.
-        bend = 1.0 if (side == 0) == (below == 0) else -1.0
-        forearm_ahead = ahead - a2 * (ahead * along + bend * drop * across) / span2
-        forearm_drop = drop - a2 * (drop * along - bend * ahead * across) / span2
-        c23 = (a3 * forearm_ahead - d4 * forearm_drop) / forearm2
-        s23 = (a3 * forearm_drop + d4 * forearm_ahead) / forearm2
-        joint_2 = _nearest_turn(arm, 1, sense * (to_wrist - bend * off_wrist))
-        joint_3 = _nearest_turn(arm, 2, sense * (bend * elbow + stretched))
-        aligned = _solve_wrist(arm, T_BF, c1, s1, c23, s23, joints, slot)
-        for solution in (slot, slot + 1):
-            joints[solution, 0], joints[solution, 1], joints[solution, 2] = joint_1, joint_2, joint_3
-            reasons[solution] = _SINGULAR if singular or aligned else _first_limit(arm, joints, solution)
 
 
 @kernel

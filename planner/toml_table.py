@@ -64,6 +64,13 @@ class TomlTable:
             raise self.refuse(key, _range_text(above, at_least, at_most))
         return float(value)
 
+    def count(self, key: str, default: int, *, at_least: int, at_most: int) -> int:
+        """Return the whole number `key` in [at_least, at_most]."""
+        value = self._take(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or not at_least <= value <= at_most:
+            raise self.refuse(key, f"a whole number from {at_least} to {at_most}")
+        return value
+
     def numbers(self, key: str, count: int, default: Sequence[float] | None = None) -> tuple[float, ...]:
         """Return the list `key` of `count` finite numbers; required without a default."""
         value = self._take(key, default)
