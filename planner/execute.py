@@ -60,7 +60,7 @@ class Settings(NamedTuple):
     lag_s: float = 0.0035
     lead_s: float = 0.0
     tolerance_deg: float = 1.0
-    drift_deg: float = 0.1
+    drift_deg: float = 0.15
     drift_filter_s: float = 3.0
     poll_s: float = 0.05
     look_s: float = 0.02

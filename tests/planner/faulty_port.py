@@ -27,8 +27,10 @@ class FaultyPort:
         clock: its time, or what a test puts in its place.
     """
 
-    def __init__(self, fault: Fault | None = None, fault_s: float = 0.0, faults: int = 1_000_000) -> None:
-        self._port = cast("Any", open_port("emulator://", 9600, 0.5))
+    def __init__(
+        self, fault: Fault | None = None, fault_s: float = 0.0, faults: int = 1_000_000, url: str = "emulator://"
+    ) -> None:
+        self._port = cast("Any", open_port(url, 9600, 0.5))
         self._fault, self._fault_s, self._faults = fault, fault_s, faults
         self.table: Any = self._port.table
         self.clock: Clock = self._port.clock

@@ -1,6 +1,7 @@
 """Execution in virtual time: on a sound table, and on tables and lines that go wrong in mid-run."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -98,6 +99,15 @@ def test_drift_of_the_clocks_is_corrected() -> None:
     in_time = Settings(lead_s=Settings().lag_s)
     assert last_deviation_deg(in_time._replace(drift_deg=100.0)) > 0.45
     assert last_deviation_deg(in_time) < 0.35
+
+
+@pytest.mark.parametrize("torque_constant_Nm_A", [0.0187, 0.0281])
+def test_the_lag_of_another_motor_is_not_taken_for_drift(torque_constant_Nm_A: float, tmp_path: Path) -> None:
+    config = tmp_path / "table.toml"
+    config.write_text(f"[motor]\ntorque_constant_Nm_A = {torque_constant_Nm_A}\n", encoding="utf-8")
+    record = run(motion_at(25.0, 12.0), FaultyPort(url=f"emulator://?config={config}"))
+    assert record.failure is None
+    assert not record.corrections
 
 
 def test_a_line_that_dies_is_reported_and_what_was_seen_is_kept() -> None:
