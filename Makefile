@@ -14,7 +14,8 @@ demo: $(VENV)/demo.stamp
 	$(BIN)/python -m tools.demo --out build/demo
 
 test: $(VENV)/test.stamp
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto -m 'not realtime'
+	$(BIN)/python -m pytest -m realtime   # alone, since they measure time
 
 lint: $(VENV)/test.stamp
 	$(BIN)/ruff format --check .
