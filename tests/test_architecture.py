@@ -42,6 +42,7 @@ PROTOCOL_EDGE = {
     "protocol/clock.py": {"time"},
     "protocol/conformance/__main__.py": {"datetime", "pathlib"},
     "protocol/conformance/fixture.py": {"os", "pathlib", "subprocess"},
+    "protocol/conformance/host_watch.py": {"os", "select", "threading", "time"},
     "protocol/conformance/ports.py": {"pathlib", "serial"},
     "protocol/conformance/profile.py": {"pathlib"},
     "protocol/conformance/pytest_plugin.py": {"pathlib"},

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from protocol.conformance.case import Case, chosen_cases
+from protocol.conformance.host_watch import watch_in
 from protocol.conformance.ports import described, is_simulated, open_port
 from protocol.conformance.profile import Profile, ProfileError, load_profile
 from protocol.conformance.record import Header, RecordError, count_verdicts, read_record, write_junit, write_record
@@ -113,15 +114,17 @@ def _run(options: argparse.Namespace, profile: Profile, port: ReopenablePort, ca
     options.out.mkdir(parents=True, exist_ok=True)
     _confirm(options, profile, port)
     begun = None if is_simulated(port) else datetime.now().astimezone().isoformat(timespec="seconds")
-    session = Session(RecordedPort(port), profile, stand_beside(port, options.control, profile), options.seed)
-    header = Header(
-        described(options.port), profile, options.seed, session.home_deg, sorted(session.capabilities), begun
-    )
     outcomes: list[Outcome] = []
-    try:
-        session.run(cases, _progress(outcomes, len(cases), options))
-    except KeyboardInterrupt:
-        _say(f"interrupted after {len(outcomes)} of {len(cases)} cases; the table was stopped")
+    with watch_in(simulated=is_simulated(port)) as watch:
+        stand = stand_beside(port, options.control, profile)
+        session = Session(RecordedPort(port), profile, stand, options.seed, watch)
+        header = Header(
+            described(options.port), profile, options.seed, session.home_deg, sorted(session.capabilities), begun
+        )
+        try:
+            session.run(cases, _progress(outcomes, len(cases), options))
+        except KeyboardInterrupt:
+            _say(f"interrupted after {len(outcomes)} of {len(cases)} cases; the table was stopped")
     write_record(options.out / "record.json", header, outcomes)
     write_junit(options.junit or options.out / "junit.xml", header, outcomes)
     write_report(options.out / "report.html", header, outcomes, lambda case: _repeat(options, case))
@@ -141,6 +144,8 @@ def _progress(outcomes: list[Outcome], total: int, options: argparse.Namespace) 
             sys.stderr.write(
                 f"\r\x1b[K{len(outcomes)}/{total} {outcome.case.id}\r" if len(outcomes) < total else "\r\x1b[K"
             )
+        for run in outcome.spoiled:
+            _say(f"{outcome.case.id} was run again, since {run}")
         if outcome.verdict is Verdict.PASS:
             return
         print(f"{outcome.verdict:9} {outcome.case.id}: {outcome.reason}")

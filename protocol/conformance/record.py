@@ -160,6 +160,7 @@ def _case(outcome: Outcome) -> dict[str, Any]:
         "how": outcome.case.how,
         "verdict": outcome.verdict,
         "reason": outcome.reason,
+        "spoiled": list(outcome.spoiled),
         "seconds": round(outcome.seconds, 6),
         "measurements": [_measurement(measurement) for measurement in outcome.measurements],
         "motion": None if outcome.motion is None else _motion(outcome.motion),

@@ -94,6 +94,7 @@ def _case(outcome: Outcome, repeat: Repeat) -> str:
     ]
     if outcome.reason:
         parts.append(f'<p class="reason{"" if bad else " quiet"}">{escape(outcome.reason)}</p>')
+    parts += [f'<p class="reason quiet">Run again, since {escape(run)}</p>' for run in outcome.spoiled]
     if outcome.measurements:
         parts.append(_measurements(outcome.measurements))
     if outcome.motion is not None:

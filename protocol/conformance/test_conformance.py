@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from protocol.conformance.case import Case, all_cases
+from protocol.conformance.host_watch import watch_in
 from protocol.conformance.ports import is_simulated, open_port
 from protocol.conformance.profile import ProfileError, load_profile
 from protocol.conformance.stand import StandError, stand_beside
@@ -23,11 +24,12 @@ def session(pytestconfig: pytest.Config) -> Iterator[Session]:
         if not is_simulated(port) and not pytestconfig.getoption("--table-yes"):
             pytest.exit(f"the table at {url} would be moved; say --table-yes if its way is free", returncode=2)
         stand = stand_beside(port, pytestconfig.getoption("--table-control"), profile)
-        one = Session(RecordedPort(port), profile, stand)
+        with watch_in(simulated=is_simulated(port)) as watch:
+            one = Session(RecordedPort(port), profile, stand, watch=watch)
+            yield one
+            one.end()
     except (ProfileError, SessionError, StandError) as error:
         pytest.exit(str(error), returncode=2)
-    yield one
-    one.end()
     port.close()
 
 
