@@ -82,6 +82,30 @@ def test_what_the_next_client_sends_comes_after_the_first_one_left(port: PtyPort
     assert port.receive() == Arrival(left_before=True, data=b"0\r")
 
 
+class Overtaken(PtyPort):
+    """A port whose next client writes just when the bytes of the last one are looked at."""
+
+    next_client = -1
+
+    def _read(self, whole: bool = False) -> bytes:
+        if whole:
+            self.next_client = os.open(self.name, os.O_RDWR | os.O_NOCTTY)
+            os.write(self.next_client, b"H\r")
+        return super()._read(whole)
+
+
+def test_a_client_that_writes_while_another_leaves_is_not_taken_for_it(warnings: list[str], opened: Open) -> None:
+    port = Overtaken(9600, warnings.append)
+    client = opened(port.name)
+    port.receive()
+    os.close(client)
+    assert port.receive() == Arrival(left_before=True, data=b"H\r")
+    port.send(b"H 0.0\r")
+    assert read_now(port.next_client) == b"H 0.0\r"
+    os.close(port.next_client)
+    port.close()
+
+
 def test_a_reply_to_a_client_that_has_gone_is_not_kept_for_the_next(port: PtyPort, opened: Open) -> None:
     client = opened(port.name)
     port.receive()
