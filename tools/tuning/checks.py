@@ -153,7 +153,7 @@ def reversal(config: TableConfig, seed: int) -> Check:
     window = answer.time_s > 0.7
     return Check(
         "reversal through the backlash",
-        "encoder behind the reference, deg",
+        "encoder behind, deg",
         Curve(answer.time_s[window], error[window], None),
         (Figure("most that the encoder is behind in a reversal", "deg", float(np.abs(error[window]).max()), None),),
     )
