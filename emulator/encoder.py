@@ -27,6 +27,12 @@ def count_at(parameters: Encoder, angle_rad: float) -> int:
     return wrap_int32(math.floor(angle_rad * parameters.count_rad + parameters.phase))
 
 
+def recounted(parameters: Encoder, angle_rad: float, count: int) -> Encoder:
+    """Return the encoder whose counter reads `count` at this motor angle; the shaft stays between the same edges."""
+    counted = math.floor(angle_rad * parameters.count_rad + parameters.phase) - count
+    return parameters._replace(phase=parameters.phase - counted)
+
+
 def angle_within_tick(start_rad: float, end_rad: float, start_speed_rad_s: float, tick_s: float, share: float) -> float:
     """Return the shaft's angle at a share (0..1) of a tick, from both ends and the speed at the start.
 

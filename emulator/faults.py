@@ -1,7 +1,7 @@
 """What can go wrong with a table: the faults by name, and when each strikes.
 
-The same names and numbers are used in a configuration file, on the control channel and by `Table.inject`. What they do
-is in `fault_effects`.
+The same names and numbers are used in a configuration file, on the control channel and by `Table.inject`. When a fault
+holds is in `fault_schedule`; what it does is in `line_faults`, `drive_faults` and `trigger_faults`.
 """
 
 from collections.abc import Mapping

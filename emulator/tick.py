@@ -11,9 +11,10 @@ from emulator.config import TableConfig
 from emulator.drive_train import DriveState, DriveTrain, drive_train
 from emulator.drive_train import step as drive_step
 from emulator.encoder import Encoder, count_at, encoder
-from emulator.firmware import Firmware, FirmwareState, firmware
+from emulator.firmware import IDLE, STALLED, Firmware, FirmwareState, firmware, power_on
 from emulator.firmware import step as firmware_step
 from emulator.pid import duty_max
+from emulator.profiler import Profile
 
 
 class TableConstants(NamedTuple):
@@ -43,9 +44,30 @@ def table_constants(config: TableConfig, encoder_phase: float) -> TableConstants
     )
 
 
+def woken(constants: TableConstants, drive: DriveState, profile: Profile) -> TableState:
+    """Return the table as its controller wakes where the plant is; `profile` holds until the first motion command."""
+    count = count_at(constants.encoder, drive.angle_rad)
+    return TableState(drive, power_on(constants.firmware, profile, count), 0)
+
+
 def step(constants: TableConstants, state: TableState, load_torque_Nm: float) -> TableState:
     """Return the table one tick later."""
     drive = drive_step(constants.drive, state.drive, state.duty * constants.volts_per_duty, load_torque_Nm)
     count = count_at(constants.encoder, drive.angle_rad)
     controller = firmware_step(constants.firmware, state.firmware, count)
     return TableState(drive, controller, state.firmware.pid.duty)
+
+
+def run_undisturbed(
+    constants: TableConstants, state: TableState, load_torque_Nm: float, ticks: int
+) -> tuple[TableState, bool]:
+    """Return the table after ticks in which nothing comes from outside, and whether it rests.
+
+    A resting state is one whose step returns itself: it stays for ever, and the ticks that are left cost nothing.
+    """
+    for _ in range(ticks):
+        before = state
+        state = step(constants, before, load_torque_Nm)
+        if state.firmware.motion in (IDLE, STALLED) and state == before:
+            return state, True
+    return state, False

@@ -6,13 +6,17 @@ An edge may come at any instant: its time is a tick and a fraction of it.
 import math
 from heapq import heappop, heappush
 
+from emulator.fault_schedule import FaultSchedule
+from emulator.trigger_faults import TriggerFaults
+
 
 class TriggerInput:
     """The edges to come: single ones, and a periodic train."""
 
-    def __init__(self, tick_hz: int) -> None:
+    def __init__(self, tick_hz: int, faults: FaultSchedule) -> None:
         """Start with a silent input."""
         self._tick_hz = tick_hz
+        self._faults = TriggerFaults(tick_hz, faults)
         self._rate_hz = 0.0
         self._origin_tick = 0
         self._periods = 0
@@ -53,6 +57,14 @@ class TriggerInput:
         else:
             self._periods += 1
         return edge[1]
+
+    def sees_edge(self, tick: int) -> bool:
+        """Return whether the controller sees an edge in this tick; where a fault makes it bounce, others follow it."""
+        if self._faults.misses_edge():
+            return False
+        for edge in self._faults.bounces(tick):
+            self.add_edge(*edge)
+        return True
 
     def _upcoming(self) -> list[tuple[int, float]]:
         edges = self._single[:1]

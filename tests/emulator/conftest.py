@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.emulator.fault_bench import Bench
+
 PATIENCE_S = 20.0
 """How long to wait for what should come at once: only a failing test ever does."""
 
@@ -89,3 +91,9 @@ def opened() -> Iterator[Callable[[str], int]]:
             os.close(descriptor)
         except OSError:
             continue
+
+
+@pytest.fixture
+def bench() -> Bench:
+    """A table for faults to strike, with its port and its client."""
+    return Bench()

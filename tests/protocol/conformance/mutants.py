@@ -115,9 +115,7 @@ class KeepsHalfLines(Mutant):
     """the half line of a client that left meets the next one"""
 
     def disconnect(self) -> None:
-        lines = self._lines
-        self._uart.disconnect()
-        self._lines = lines
+        self._serial.uart.disconnect()
 
 
 @caught_by("3.2/2")
@@ -302,13 +300,14 @@ class SwapsRepliesUnderLoad(Mutant):
 
     held = b""
 
-    def _put(self, reply: bytes) -> None:
-        busy = self._uart.waiting_count > 8
+    def _reply(self, command: Line) -> bytes:
+        reply = super()._reply(command)
+        busy = self._serial.uart.waiting_count > 8
         if busy and not self.held:
             self.held = reply
-            return
-        super()._put(reply + self.held)
-        self.held = b""
+            return b""
+        reply, self.held = reply + self.held, b""
+        return reply
 
 
 @caught_by("5.1/1")
@@ -328,7 +327,7 @@ class AnnouncesArrival(Mutant):
     def advance(self, ticks: int) -> None:
         super().advance(ticks)
         if self.was_moving and self._state.firmware.motion == IDLE:
-            self._put(b"DONE\r")
+            self._serial.write(b"DONE\r", self.tick)
         self.was_moving = self.moving
 
 
@@ -626,7 +625,7 @@ class SpeaksAtTriggers(Mutant):
 
     def trigger(self, fraction: float = 0.0) -> None:
         super().trigger(fraction)
-        self._put(b"TRIG\r")
+        self._serial.write(b"TRIG\r", self.tick)
 
 
 # Recovery
