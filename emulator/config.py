@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Self, get_type_hints
 
 from emulator.faults import Fault, FaultError, fault_from
-from emulator.fixed_point import SPEED_BITS
+from emulator.fixed_point import SPEED_BITS, gain_registers
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
 
@@ -40,6 +40,11 @@ class DriverConfig:
 
     supply_V: float = quantity(above=0, most=1000)
     pwm_bits: int = quantity(least=4, most=11)
+
+    @property
+    def duty_max(self) -> int:
+        """PWM steps at full duty."""
+        return (1 << self.pwm_bits) - 1
 
 
 @dataclass(frozen=True)
@@ -161,6 +166,13 @@ class TableConfig:
     def counts_per_turn(self) -> float:
         """Encoder counts in one turn of the table: quadrature counts each line four times."""
         return 4 * self.encoder.lines * self.gears.ratio
+
+    def gains_per_tick(self, gains: GainsConfig) -> tuple[float, float, float]:
+        """Return K, K / Ti and K Td as one tick applies them: PWM steps for a speed error of one count a window."""
+        tick_s = 1.0 / self.control.tick_hz
+        error_unit_deg_s = 360.0 / self.counts_per_turn / (self.control.speed_window_ticks * tick_s)
+        gain = gains.proportional_duty_s_deg * self.driver.duty_max * error_unit_deg_s
+        return gain, gain * tick_s / gains.integral_time_s, gain * gains.derivative_time_s / tick_s
 
     def with_serial(self, **changes: int | bool | None) -> Self:
         """Return this table with other serial settings; a setting that is None stays as it is.
@@ -291,10 +303,9 @@ def _check_registers(config: TableConfig, source: str) -> None:
             raise ConfigError(
                 f"{source}: {name} is {value:g}; with this encoder and tick the firmware holds {least:g} to {most:g}"
             )
-    from emulator.pid import fixed_gains  # noqa: PLC0415  # pid takes the types of this file
-
     for name in ("ramp", "hold"):
+        gains = getattr(config.gains, name)
         try:
-            fixed_gains(config, getattr(config.gains, name))
-        except ConfigError as error:
-            raise ConfigError(f"{source}: gains.{name}: {error}") from None
+            gain_registers(*config.gains_per_tick(gains))
+        except OverflowError as error:
+            raise ConfigError(f"{source}: gains.{name}: {gains} does not fit the firmware: {error}") from None

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from emulator.config import TableConfig
 from emulator.fixed_point import ERROR_BITS, POSITION_BITS, SPEED_BITS, clamp, to_fixed, wrap_int32
-from emulator.pid import HOLD, RAMP, Pid, PidState, duty_max, pid, switched_off
+from emulator.pid import HOLD, RAMP, Pid, PidState, pid, switched_off
 from emulator.pid import step as pid_step
 from emulator.profiler import Profile, Reference, at_rest, retarget
 from emulator.profiler import step as profiler_step
@@ -63,7 +63,7 @@ def firmware(config: TableConfig) -> Firmware:
         arrival_ticks=max(1, round(settling.arrival_time_s * tick_hz)),
         approach_rate=to_fixed(settling.approach_rate_1_s / tick_hz, SPEED_BITS),
         approach_speed=to_fixed(settling.approach_speed_deg_s * config.counts_per_turn / 360.0 / tick_hz, SPEED_BITS),
-        stall_duty=round(protection.stall_duty * duty_max(config)),
+        stall_duty=round(protection.stall_duty * config.driver.duty_max),
         stall_ticks=max(1, round(protection.stall_time_s * tick_hz)),
         settling_ticks=max(1, round(protection.settling_time_s * tick_hz)),
     )

@@ -45,6 +45,24 @@ def to_fixed(value: Fraction | float, fraction_bits: int) -> int:
     return round(Fraction(value) * (1 << fraction_bits))
 
 
+def gain_registers(proportional: float, integral: float, derivative: float) -> tuple[int, int, int]:
+    """Return a gain set, in the units of the table above, as the firmware's registers hold it.
+
+    Raises:
+        OverflowError: A gain does not fit its register, or the integral gain rounds to nothing.
+    """
+    registers = (
+        to_fixed(proportional, GAIN_BITS),
+        to_fixed(integral, INTEGRAL_GAIN_BITS),
+        to_fixed(derivative, GAIN_BITS),
+    )
+    if max(registers) > INT32_MAX or registers[1] < 1:
+        raise OverflowError(
+            f"its registers would hold {registers}; each must be at most {INT32_MAX}, the integral gain at least 1"
+        )
+    return registers
+
+
 def from_fixed(number: int, fraction_bits: int) -> float:
     """Return the value of an integer with that many fraction bits."""
     return number / (1 << fraction_bits)

@@ -9,7 +9,7 @@ see `fixed_point`.
 from typing import NamedTuple
 
 from emulator.config import ConfigError, GainsConfig, TableConfig
-from emulator.fixed_point import ERROR_BITS, GAIN_BITS, INT32_MAX, INTEGRAL_GAIN_BITS, OUTPUT_BITS, clamp, to_fixed
+from emulator.fixed_point import ERROR_BITS, INTEGRAL_GAIN_BITS, OUTPUT_BITS, clamp, gain_registers
 
 RAMP = 0
 HOLD = 1
@@ -20,11 +20,11 @@ _ERROR_MAX = (1 << 21) - 1
 
 
 class Gains(NamedTuple):
-    """One gain set, in the firmware's formats."""
+    """One gain set, in the firmware's formats: PWM steps for a speed error of one count a window."""
 
-    proportional: int
-    integral: int
-    derivative: int
+    proportional: int  # 12 fraction bits
+    integral: int  # a tick, 16 fraction bits
+    derivative: int  # for a change of one count a window in a tick, 12 fraction bits
 
 
 class Pid(NamedTuple):
@@ -38,7 +38,7 @@ class Pid(NamedTuple):
 class PidState(NamedTuple):
     """What the regulator remembers from tick to tick."""
 
-    integral: int
+    integral: int  # PWM steps, 20 fraction bits
     measured: int  # count/window
     gain_set: int
     duty: int  # PWM steps
@@ -46,34 +46,24 @@ class PidState(NamedTuple):
 
 def pid(config: TableConfig) -> Pid:
     """Return the regulator of a configured table, its gains rounded to the firmware's formats."""
-    return Pid(fixed_gains(config, config.gains.ramp), fixed_gains(config, config.gains.hold), duty_max(config))
+    return Pid(fixed_gains(config, config.gains.ramp), fixed_gains(config, config.gains.hold), config.driver.duty_max)
 
 
 def duty_max(config: TableConfig) -> int:
     """Return the PWM steps at full duty."""
-    return int((1 << config.driver.pwm_bits) - 1)
+    return config.driver.duty_max
 
 
 def fixed_gains(config: TableConfig, gains: GainsConfig) -> Gains:
-    """Return a gain set as the firmware holds it: PWM steps for a speed error of one count a window.
+    """Return a gain set of a table as the firmware holds it.
 
     Raises:
         ConfigError: A gain does not fit its register, or the integral gain rounds to nothing.
     """
-    tick_s = 1.0 / config.control.tick_hz
-    deg_s_per_count = 360.0 / config.counts_per_turn / (config.control.speed_window_ticks * tick_s)
-    proportional = gains.proportional_duty_s_deg * duty_max(config) * deg_s_per_count
-    fixed = Gains(
-        to_fixed(proportional, GAIN_BITS),
-        to_fixed(proportional * tick_s / gains.integral_time_s, INTEGRAL_GAIN_BITS),
-        to_fixed(proportional * gains.derivative_time_s / tick_s, GAIN_BITS),
-    )
-    if max(fixed) > INT32_MAX or fixed.integral < 1:
-        raise ConfigError(
-            f"{gains} does not fit the firmware: its registers would hold {tuple(fixed)}; "
-            f"each must be at most {INT32_MAX}, the integral gain at least 1"
-        )
-    return fixed
+    try:
+        return Gains(*gain_registers(*config.gains_per_tick(gains)))
+    except OverflowError as error:
+        raise ConfigError(f"{gains} does not fit the firmware: {error}") from None
 
 
 def switched_off(state: PidState, measured: int) -> PidState:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from emulator.config import TableConfig
 from emulator.firmware import STATE_NAMES
 from emulator.fixed_point import POSITION_BITS, SPEED_BITS, from_fixed
-from emulator.pid import RAMP, duty_max
+from emulator.pid import RAMP
 from emulator.tick import TableState
 from emulator.uart import Uart
 
@@ -56,7 +56,7 @@ def table_status(
         speed_deg_s=regulator.measured / config.control.speed_window_ticks * speed_deg_s,
         true_speed_deg_s=math.degrees(drive.table_speed_rad_s),
         current_A=drive.current_A,
-        duty=regulator.duty / duty_max(config),
+        duty=regulator.duty / config.driver.duty_max,
         gain_set="ramp" if regulator.gain_set == RAMP else "hold",
         state=STATE_NAMES[controller.motion],
         latched_deg=latched_count / count_deg,

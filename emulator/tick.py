@@ -13,7 +13,6 @@ from emulator.drive_train import step as drive_step
 from emulator.encoder import Encoder, count_at, encoder
 from emulator.firmware import IDLE, STALLED, Firmware, FirmwareState, firmware, power_on
 from emulator.firmware import step as firmware_step
-from emulator.pid import duty_max
 from emulator.profiler import Profile
 
 
@@ -40,7 +39,7 @@ def table_constants(config: TableConfig, encoder_phase: float) -> TableConstants
         drive_train(config),
         encoder(config, encoder_phase),
         firmware(config),
-        config.driver.supply_V / duty_max(config),
+        config.driver.supply_V / config.driver.duty_max,
     )
 
 
