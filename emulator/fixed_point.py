@@ -37,7 +37,9 @@ def clamp(number: int, bound: int) -> int:
     """Return `number`, or what is nearest to it within -bound..bound."""
     if number > bound:
         return bound
-    return max(number, -bound)
+    if number < -bound:
+        return -bound
+    return number
 
 
 def to_fixed(value: Fraction | float, fraction_bits: int) -> int:
