@@ -16,44 +16,71 @@ LOST: Final = None
 """Stands in the receive buffer where bytes were lost."""
 
 
+class _Wire:
+    """One direction of the line, on which bytes follow each other without a gap."""
+
+    def __init__(self, baud: int, tick_hz: int) -> None:
+        self.queue: deque[int] = deque()
+        self._tick_units = baud
+        self._byte_units = 10 * tick_hz
+        self._units = 0  # of the first byte that have passed
+
+    def advance(self) -> list[int]:
+        """Return the bytes that are over when a tick has passed."""
+        over = []
+        if self.queue:
+            self._units += self._tick_units
+            while self.queue and self._units >= self._byte_units:
+                self._units -= self._byte_units
+                over.append(self.queue.popleft())
+        if not self.queue:
+            self._units = 0
+        return over
+
+    def ticks_until_byte(self) -> int:
+        """Return the ticks until the first byte is over; only while there is one."""
+        return max(1, -(-(self._byte_units - self._units) // self._tick_units))
+
+    def clear(self) -> None:
+        """Forget what is on the line."""
+        self.queue.clear()
+        self._units = 0
+
+
 class Uart:
     """Both directions of a paced line. A baud rate of 0 is not its business: then there is no line to wait for."""
 
     def __init__(self, baud: int, tick_hz: int) -> None:
         """Start with an idle line."""
-        self._baud = baud
-        self._byte_units = 10 * tick_hz
-        self._incoming: deque[int] = deque()
-        self._incoming_units = 0
+        self._incoming = _Wire(baud, tick_hz)
+        self._outgoing = _Wire(baud, tick_hz)
         self._received: deque[int | None] = deque()
-        self._outgoing: deque[int] = deque()
-        self._outgoing_units = 0
         self._sent = bytearray()
         self.lost_bytes = 0
 
     @property
     def idle(self) -> bool:
         """Whether nothing is on the line or waiting for the firmware."""
-        return not (self._incoming or self._outgoing or self._received)
+        return not (self._incoming.queue or self._outgoing.queue or self._received)
 
     @property
     def waiting_count(self) -> int:
         """Bytes on their way to the firmware."""
-        return len(self._incoming) + len(self._received)
+        return len(self._incoming.queue) + len(self._received)
 
     @property
     def transmit_count(self) -> int:
         """Bytes that the firmware has written and the line has not yet carried."""
-        return len(self._outgoing)
+        return len(self._outgoing.queue)
 
     @property
     def transmit_room(self) -> int:
         """Bytes that the firmware may still write."""
-        return TRANSMIT_LIMIT - len(self._outgoing)
+        return TRANSMIT_LIMIT - len(self._outgoing.queue)
 
     def receive(self, data: bytes) -> None:
         """Take bytes that the client puts on the line now."""
-        self._incoming.extend(data)
+        self._incoming.queue.extend(data)
 
     def transmit(self) -> bytes:
         """Return the bytes whose stop bit has left, and forget them."""
@@ -72,41 +99,25 @@ class Uart:
 
     def write(self, data: bytes) -> None:
         """Queue the firmware's bytes for the line."""
-        self._outgoing.extend(data)
+        self._outgoing.queue.extend(data)
 
     def advance(self) -> None:
         """Let one tick pass on the line."""
-        if self._incoming:
-            self._incoming_units += self._baud
-            while self._incoming and self._incoming_units >= self._byte_units:
-                self._incoming_units -= self._byte_units
-                self._store(self._incoming.popleft())
-        if not self._incoming:
-            self._incoming_units = 0
-        if self._outgoing:
-            self._outgoing_units += self._baud
-            while self._outgoing and self._outgoing_units >= self._byte_units:
-                self._outgoing_units -= self._byte_units
-                self._sent.append(self._outgoing.popleft())
-        if not self._outgoing:
-            self._outgoing_units = 0
+        for byte in self._incoming.advance():
+            self._store(byte)
+        self._sent += bytes(self._outgoing.advance())
 
     def ticks_until_byte(self) -> int | None:
         """Return the ticks until the next byte is over, in either direction; None on an idle line."""
-        pending = [
-            -(-(self._byte_units - units) // self._baud)
-            for queue, units in ((self._incoming, self._incoming_units), (self._outgoing, self._outgoing_units))
-            if queue
-        ]
-        return max(1, min(pending)) if pending else None
+        busy = (wire for wire in (self._incoming, self._outgoing) if wire.queue)
+        return min((wire.ticks_until_byte() for wire in busy), default=None)
 
     def disconnect(self) -> None:
         """Forget what is on the line: the client has gone."""
         self._incoming.clear()
-        self._received.clear()
         self._outgoing.clear()
+        self._received.clear()
         self._sent.clear()
-        self._incoming_units = self._outgoing_units = 0
 
     def _store(self, byte: int) -> None:
         if len(self._received) < RECEIVE_LIMIT:
