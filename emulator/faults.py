@@ -109,6 +109,20 @@ def fault_from(kind: object, given: Mapping[str, object]) -> Fault:
     """
     if not isinstance(kind, str) or kind not in KINDS:
         raise FaultError(f"{kind!r} is no fault; there are {', '.join(KINDS)}")
+    _check_numbers(kind, given)
+    numbers = {name: float(value) for name, value in given.items() if isinstance(value, int | float)}
+    own = (parameter.name for parameter in KINDS[kind].parameters)
+    at_command = numbers.get("at_command")
+    return Fault(
+        kind,
+        tuple((name, numbers[name]) for name in own if name in numbers),
+        numbers.get("at_s"),
+        None if at_command is None else int(at_command),
+        numbers.get("for_s"),
+    )
+
+
+def _check_numbers(kind: str, given: Mapping[str, object]) -> None:
     parameters = parameters_of(kind)
     unknown = sorted(set(given) - {parameter.name for parameter in parameters})
     if unknown:
@@ -121,16 +135,3 @@ def fault_from(kind: object, given: Mapping[str, object]) -> Fault:
             raise FaultError(f"{kind}: {parameter.name} is {given[parameter.name]!r}; it must be {parameter.allowed}")
     if "at_s" in given and "at_command" in given:
         raise FaultError(f"{kind}: at_s and at_command are two beginnings; give one of them")
-    numbers = {name: float(value) for name, value in given.items() if isinstance(value, int | float)}
-    at_command = numbers.get("at_command")
-    return Fault(
-        kind,
-        tuple(
-            (parameter.name, numbers[parameter.name])
-            for parameter in KINDS[kind].parameters
-            if parameter.name in numbers
-        ),
-        numbers.get("at_s"),
-        None if at_command is None else int(at_command),
-        numbers.get("for_s"),
-    )

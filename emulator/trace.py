@@ -6,7 +6,6 @@ rest costs nothing and a line drawn through the rows is still the true one.
 
 import csv
 from array import array
-from collections.abc import Callable
 from operator import attrgetter
 from pathlib import Path
 from types import TracebackType
@@ -38,7 +37,9 @@ class Trace(NamedTuple):
 
 
 _COLUMNS = Trace._fields
-_NUMBERS, _WORDS, _BYTES = _COLUMNS[:9], _COLUMNS[9:11], _COLUMNS[11:]
+_BYTES = ("received", "transmitted")
+_WORDS = ("gain_set", "state")
+_NUMBERS = tuple(name for name in _COLUMNS if name not in {*_WORDS, *_BYTES})
 _values_of = attrgetter(*_NUMBERS[1:], *_WORDS)
 
 _Values = tuple[float | str, ...]
@@ -119,8 +120,8 @@ def read_trace(path: Path) -> Trace:
     def octets(name: str) -> list[bytes]:
         return [_as_bytes(word) for word in words(name)]
 
-    readers: list[Callable[[str], Any]] = [numbers] * 9 + [words] * 2 + [octets] * 2
-    return Trace(*(reader(name) for reader, name in zip(readers, _COLUMNS, strict=True)))
+    columns_as: list[Any] = [*map(numbers, _NUMBERS), *map(words, _WORDS), *map(octets, _BYTES)]
+    return Trace(*columns_as)
 
 
 class _Sink(Protocol):
