@@ -289,6 +289,7 @@ def _check_registers(config: TableConfig, source: str) -> None:
     """Refuse what does not fit the firmware's number formats; see `fixed_point`."""
     count_deg, tick_hz = config.counts_per_turn / 360.0, config.control.tick_hz
     unit = 2.0**-SPEED_BITS
+    # A speed register ends at 32 counts a tick, and the sum of a speed and an acceleration must fit too.
     speeds_deg_s = (unit * tick_hz / count_deg, 31.0 * tick_hz / count_deg)
     accelerations_deg_s2 = (unit * tick_hz**2 / count_deg, tick_hz**2 / count_deg)
     held = (

@@ -42,9 +42,7 @@ class DriveTrain(NamedTuple):
     table_per_motor: float  # the reciprocal of the ratio
     half_gap_rad: float  # at the table
     tick_s: float
-    table_inertia_s: (
-        float  # inertia at the table times the gears' reciprocal, over the tick: torque for a change of speed
-    )
+    inertial_torque_Nm_s: float  # at the table, for each rad/s by which the motor's speed changes within a tick
 
 
 class DriveState(NamedTuple):
@@ -55,7 +53,7 @@ class DriveState(NamedTuple):
     angle_rad: float  # of the motor
     table_speed_rad_s: float
     table_angle_rad: float
-    contact: int
+    contact: int  # 1 or -1: on the flank that drives forwards or backwards; 0: within the gap
 
 
 def drive_train(config: TableConfig) -> DriveTrain:
@@ -96,7 +94,7 @@ def drive_train(config: TableConfig) -> DriveTrain:
         table_per_motor=1.0 / gears.ratio,
         half_gap_rad=math.radians(gears.backlash_arcmin / 60.0) / 2.0,
         tick_s=tick_s,
-        table_inertia_s=table.inertia_kg_m2 / (gears.ratio * tick_s),
+        inertial_torque_Nm_s=table.inertia_kg_m2 / (gears.ratio * tick_s),
     )
 
 
@@ -126,7 +124,7 @@ def _turning(train: DriveTrain, state: DriveState, voltage_V: float, load_torque
     current, next_speed, angle = _motor(
         coupling.motor, state, voltage_V, friction + coupling.torque_ratio * table_torque
     )
-    tooth_torque = train.table_inertia_s * (next_speed - speed) + table_torque
+    tooth_torque = train.inertial_torque_Nm_s * (next_speed - speed) + table_torque
     if rigid and direction * tooth_torque < 0.0:
         coupling = train.overhauling
         current, next_speed, angle = _motor(
@@ -154,15 +152,15 @@ def _standing(train: DriveTrain, state: DriveState, voltage_V: float, load_torqu
         coupling = train.driving if direction * table_torque >= 0.0 else train.overhauling
         resisting = direction * train.friction.static_Nm + coupling.torque_ratio * table_torque
         if direction * (torque - resisting) > 0.0:
-            broken_away = _motor(coupling.motor, state, voltage_V, resisting)
-            if direction * broken_away[1] > 0.0:
-                return _together(train, broken_away[0], broken_away[1], broken_away[2], contact)
+            next_current, next_speed, angle = _motor(coupling.motor, state, voltage_V, resisting)
+            if direction * next_speed > 0.0:
+                return _together(train, next_current, next_speed, angle, contact)
     return DriveState(current, 0.0, state.angle_rad, 0.0, state.table_angle_rad, contact)
 
 
 def _free(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
     """Within the gap: the motor runs alone, the table coasts, until they meet."""
-    current, speed, angle = _free_motor(train, state, voltage_V)
+    current, speed, angle = _lone_motor(train, state, voltage_V)
     table_speed, table_angle = _coasting_table(train, state, load_torque_Nm)
     gap = angle * train.table_per_motor - table_angle
     if abs(gap) < train.half_gap_rad:
@@ -192,7 +190,8 @@ def _speed_after_impact(train: DriveTrain, contact: int, speed: float, table_spe
     return (motor * speed + driving * table_speed) / (motor + driving)
 
 
-def _free_motor(train: DriveTrain, state: DriveState, voltage_V: float) -> tuple[float, float, float]:
+def _lone_motor(train: DriveTrain, state: DriveState, voltage_V: float) -> tuple[float, float, float]:
+    """Return current, speed and angle of a motor without the table one tick later."""
     speed = state.speed_rad_s
     direction = 1 if speed > 0.0 else -1
     resisting = direction * sliding_torque_Nm(train.friction, speed)
@@ -211,6 +210,7 @@ def _free_motor(train: DriveTrain, state: DriveState, voltage_V: float) -> tuple
 
 
 def _coasting_table(train: DriveTrain, state: DriveState, load_torque_Nm: float) -> tuple[float, float]:
+    """Return speed and angle of a table without the motor one tick later."""
     speed, angle = state.table_speed_rad_s, state.table_angle_rad
     if speed == 0.0:
         if abs(load_torque_Nm) <= train.bearing_friction_Nm:
@@ -226,7 +226,8 @@ def _coasting_table(train: DriveTrain, state: DriveState, load_torque_Nm: float)
 
 
 def _motor(motor: MotorStep, state: DriveState, voltage_V: float, torque_Nm: float) -> tuple[float, float, float]:
-    ii, iw, iv, im, wi, ww, wv, wm, ai, aw, av, am = motor
+    """Return current, speed and angle of the motor one tick later, against a torque that resists it."""
+    ii, iw, iv, im, wi, ww, wv, wm, ai, aw, av, am = motor  # the letters of `motor`: row, then column
     current, speed = state.current_A, state.speed_rad_s
     return (
         ii * current + iw * speed + iv * voltage_V + im * torque_Nm,
@@ -236,6 +237,7 @@ def _motor(motor: MotorStep, state: DriveState, voltage_V: float, torque_Nm: flo
 
 
 def _standing_current(train: DriveTrain, current_A: float, voltage_V: float) -> float:
+    """Return the current of a motor that stands one tick later: without back-EMF only the inductance is in its way."""
     final = voltage_V / train.resistance_ohm
     return final + (current_A - final) * train.current_decay
 
@@ -247,5 +249,6 @@ def _stopping_angle(angle_rad: float, speed_rad_s: float, next_speed_rad_s: floa
 
 
 def _together(train: DriveTrain, current_A: float, speed_rad_s: float, angle_rad: float, contact: int) -> DriveState:
+    """Return the plant whose table turns with the motor, pressed to a flank."""
     table_angle = angle_rad * train.table_per_motor - contact * train.half_gap_rad
     return DriveState(current_A, speed_rad_s, angle_rad, speed_rad_s * train.table_per_motor, table_angle, contact)

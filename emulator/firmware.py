@@ -14,7 +14,7 @@ from emulator.config import TableConfig
 from emulator.fixed_point import ERROR_BITS, POSITION_BITS, SPEED_BITS, clamp, to_fixed, wrap_int32
 from emulator.pid import HOLD, RAMP, Pid, PidState, pid, switched_off
 from emulator.pid import step as pid_step
-from emulator.profiler import Profile, Reference, at_rest, retarget
+from emulator.profiler import Profile, Reference, at_rest, retarget, standing_at
 from emulator.profiler import step as profiler_step
 
 IDLE = 0
@@ -29,26 +29,26 @@ class Firmware(NamedTuple):
     """The controller's constants, in its own formats."""
 
     pid: Pid
-    window_ticks: int
-    arrival_count: int
-    arrival_ticks: int
+    window_ticks: int  # over which the speed is measured
+    arrival_count: int  # this near is at the target
+    arrival_ticks: int  # once it has been there for so long
     approach_rate: int  # of speed over remaining distance, per tick; 26 fraction bits
     approach_speed: int  # count/tick, 26 fraction bits
-    stall_duty: int  # PWM steps
-    stall_ticks: int
-    settling_ticks: int
+    stall_duty: int  # PWM steps; a motor driven so hard must turn
+    stall_ticks: int  # within this time
+    settling_ticks: int  # the longest that settling may take
 
 
 class FirmwareState(NamedTuple):
     """The controller's memory."""
 
-    motion: int
+    motion: int  # IDLE, MOVING, SETTLING or STALLED
     profile: Profile
     reference: Reference
     counts: tuple[int, ...]  # of the last ticks, oldest first, as many as the speed window
     pid: PidState
     still_ticks: int  # driven hard without a change of the count
-    settling_ticks: int
+    settling_ticks: int  # since the profile ended
     arrived_ticks: int  # within the arrival window without a break
 
 
@@ -74,7 +74,7 @@ def power_on(parameters: Firmware, profile: Profile, count: int) -> FirmwareStat
     return FirmwareState(
         motion=IDLE,
         profile=profile,
-        reference=Reference(count, 0, 0, 0, 0),
+        reference=standing_at(count),
         counts=(count,) * parameters.window_ticks,
         pid=PidState(0, 0, HOLD, 0),
         still_ticks=0,
@@ -103,7 +103,7 @@ def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareStat
     last_count = counts[-1]
     counts = (*counts[1:], count)
     if motion in (IDLE, STALLED):
-        return FirmwareState(motion, profile, reference, counts, switched_off(regulator, measured), 0, 0, 0)
+        return _drive_off(motion, profile, reference, counts, switched_off(regulator, measured))
 
     if motion == MOVING:
         last_speed = reference.speed
@@ -116,10 +116,8 @@ def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareStat
         remaining = position_error(reference, count)
         arrived_ticks = arrived_ticks + 1 if abs(remaining) <= parameters.arrival_count else 0
         if arrived_ticks >= parameters.arrival_ticks:
-            return FirmwareState(IDLE, profile, reference, counts, switched_off(regulator, measured), 0, 0, 0)
-        demand = clamp(remaining * parameters.approach_rate, parameters.approach_speed)
-        if arrived_ticks:
-            demand = 0
+            return _drive_off(IDLE, profile, reference, counts, switched_off(regulator, measured))
+        demand = 0 if arrived_ticks else clamp(remaining * parameters.approach_rate, parameters.approach_speed)
         gain_set = HOLD
         settling_ticks += 1
 
@@ -128,9 +126,14 @@ def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareStat
     still = count == last_count and abs(regulator.duty) >= parameters.stall_duty
     still_ticks = still_ticks + 1 if still else 0
     if still_ticks >= parameters.stall_ticks or settling_ticks >= parameters.settling_ticks:
-        stands = Reference(count, 0, 0, 0, 0)
-        return FirmwareState(STALLED, profile, stands, counts, switched_off(regulator, measured), 0, 0, 0)
+        return _drive_off(STALLED, profile, standing_at(count), counts, switched_off(regulator, measured))
     return FirmwareState(motion, profile, reference, counts, regulator, still_ticks, settling_ticks, arrived_ticks)
+
+
+def _drive_off(
+    motion: int, profile: Profile, reference: Reference, counts: tuple[int, ...], regulator: PidState
+) -> FirmwareState:
+    return FirmwareState(motion, profile, reference, counts, regulator, 0, 0, 0)
 
 
 def position_error(reference: Reference, count: int) -> int:

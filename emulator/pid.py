@@ -17,6 +17,7 @@ HOLD = 1
 _HALF = 1 << (OUTPUT_BITS - 1)
 _INTEGRAL_SHIFT = ERROR_BITS + INTEGRAL_GAIN_BITS - OUTPUT_BITS
 _ERROR_MAX = (1 << 21) - 1
+"""Beyond any speed of the table; it keeps the product with the greatest gain within 64 bits."""
 
 
 class Gains(NamedTuple):

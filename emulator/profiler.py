@@ -11,11 +11,11 @@ from emulator.fixed_point import POSITION_BITS, POSITION_MASK, wrap_int32
 
 
 class Profile(NamedTuple):
-    """What one motion must keep: top speed and acceleration, 26 fraction bits, counts and ticks."""
+    """What one motion must keep."""
 
-    speed: int
-    acceleration: int
-    far: int  # see `far_distance`
+    speed: int  # the greatest, count/tick, 26 fraction bits
+    acceleration: int  # count/tick^2, 26 fraction bits
+    far: int  # count, 26 fraction bits; see `far_distance`
 
     @classmethod
     def of(cls, speed: int, acceleration: int) -> "Profile":
@@ -29,13 +29,18 @@ def far_distance(acceleration: int) -> int:
 
 
 class Reference(NamedTuple):
-    """Where the profile is: position and the distance to the target, each a count and its fraction, and speed."""
+    """Where the profile is, and its way to the target; both are words of whole counts and of 26 fraction bits."""
 
     position_count: int
     fraction: int
-    speed: int
+    speed: int  # count/tick, 26 fraction bits
     distance_count: int
     distance_fraction: int
+
+
+def standing_at(count: int) -> Reference:
+    """Return the reference of a table that stands at a count and has nowhere to go."""
+    return Reference(count, 0, 0, 0, 0)
 
 
 def at_rest(reference: Reference) -> bool:
