@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from emulator.config import load_config
 from emulator.drive_train import DriveState, at_standstill, drive_train, step
-from emulator.encoder import Encoder, angle_within_tick, count_at, encoder
+from emulator.encoder import Encoder, angle_within_tick, count_at, encoder, recounted
 
 DEFAULT = load_config()
 COUNT_RAD = 384 / (2.0 * math.pi)
@@ -30,6 +30,23 @@ def test_the_count_changes_where_an_edge_is_passed(turns: int, share: float, pha
 @given(st.integers(-(2**40), 2**40))
 def test_the_counter_wraps_as_a_32_bit_register(counts: int) -> None:
     assert count_at(Encoder(1.0, 0.5), float(counts)) == ctypes.c_int32(counts).value
+
+
+@given(
+    place=st.integers(-(10**6), 10**6),
+    share=st.floats(0.01, 0.99),
+    phase=st.floats(0.0, 1.0),
+    count=st.integers(-(2**31), 2**31 - 1),
+)
+def test_a_counter_that_is_set_keeps_the_edges_where_they_are(
+    place: int, share: float, phase: float, count: int
+) -> None:
+    def angle_rad(counts: int) -> float:
+        return (place + counts + share - phase) / COUNT_RAD
+
+    set_anew = recounted(Encoder(COUNT_RAD, phase), angle_rad(0), count)
+    for moved in (-1, 0, 1):
+        assert count_at(set_anew, angle_rad(moved)) == ctypes.c_int32(count + moved).value
 
 
 def smooth(before: DriveState, after: DriveState) -> bool:
