@@ -15,7 +15,8 @@ import numpy.typing as npt
 from planner.arm import link_frames
 from planner.arrays import CodeArray, FloatArray
 from planner.bodies import FLANGE_FRAME
-from planner.collision import ARM_FRAMES, PLACED, base_in_obstacles, nearest_pair, place_bodies
+from planner.clearance import ARM_FRAMES, PLACED, nearest_pair, place_bodies
+from planner.collision_model import base_in_obstacles
 from planner.config_map import DEFAULT_EPSILON, ConfigurationMap
 from planner.configuration import Configuration
 from planner.inverse_kinematics import inverse

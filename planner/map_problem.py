@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from planner.arrays import FloatArray
 from planner.cell import Cell
-from planner.collision import CollisionModel, collision_model
+from planner.collision_model import CollisionModel, collision_model
 from planner.obstacles import cell_obstacles, workpiece_obstacle
 from planner.scan import Scan
 from planner.value import ValueFunction

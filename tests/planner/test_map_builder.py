@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from planner.collision import clearances
+from planner.clearance import clearances
 from planner.config_map import DEFAULT_EPSILON, ConfigurationMap
 from planner.configuration import Configuration
 from planner.inverse_kinematics import inverse_kinematics

@@ -5,7 +5,6 @@ proximity, and the pair that has it is the reason where it is too small. The bea
 is fine, so it counts only where something blocks it.
 """
 
-from collections.abc import Sequence
 from math import sqrt
 from typing import NamedTuple
 
@@ -14,63 +13,33 @@ import numpy.typing as npt
 
 from planner.arm import Arm, link_frames
 from planner.arrays import FloatArray
-from planner.bodies import FLANGE_FRAME, WRIST_LINK, Bodies
+from planner.bodies import FLANGE_FRAME
 from planner.capsule import segment_distance
+from planner.collision_model import (
+    END,
+    FRAME,
+    KIND,
+    LOWER,
+    RADIUS,
+    SIZE,
+    START,
+    UPPER,
+    CollisionModel,
+    IndexArray,
+    base_in_obstacles,
+)
 from planner.kernel import kernel
-from planner.obstacles import FIELD, Obstacle, bounding_box
-from planner.signed_distance_field import NO_FIELD, SignedDistanceField, field_distance
+from planner.obstacles import FIELD
+from planner.signed_distance_field import field_distance
 from planner.solid import solid_distance
-from planner.transforms import rotations_z
 
-IndexArray = npt.NDArray[np.int64]
-
-_FIXED_LINK = 0
-_WRIST_FRAMES = (4, 5)
 ARM_FRAMES = 4
 """The frames from the base's on that bodies move with; none moves with the wrist's, and then comes the flange's."""
-_BEAM = "beam"
 
-# The columns of the bodies' table: the frame that a body moves with, its ends there in mm, its radius in mm.
-_FRAME, _START, _END, _RADIUS = 0, 1, 4, 7
-# Those of the obstacles' table: the kind, three sizes, the least and the greatest x y z of a box around it.
-_KIND, _SIZE, _LOWER, _UPPER = 0, 1, 4, 7
-# Those of a placed body: its ends and its middle in the base, half its length; all in mm.
+# The columns of a placed body: its ends and its middle in the base, half its length; all in mm.
 _MIDDLE, _HALF_LENGTH = 6, 9
 PLACED = 10
 """Columns of the table of placed bodies."""
-
-
-class CollisionModel(NamedTuple):
-    """What can collide with what, in the plain arrays that compiled kernels take; lengths in mm.
-
-    A body is a part, or, as the last one, the beam. An obstacle is numbered after the bodies.
-
-    Attributes:
-        bodies: `(n_bodies, 8)`, one row each; the beam's ends are one mm apart.
-        obstacles: `(n_obstacles, 10)`, the kind, three sizes, and a box around it in its own frame.
-        field: Of the one obstacle that is a mesh.
-        pairs: `(n_pairs, 2)`, a body and another one or an obstacle. Those of the flange's bodies with the obstacles
-            come first: they are common to all configurations.
-        n_common: How many those are.
-        poses: `(n_obstacles, 4, 4)`, of the obstacles in the table's frame or the base's.
-        turning: `(n_obstacles,)`, which of the two.
-        T_BT: `(4, 4)`, the table's axis at angle 0 in the base.
-        beam_gap_mm: What the beam stops short of the surface.
-    """
-
-    bodies: FloatArray
-    obstacles: FloatArray
-    field: SignedDistanceField
-    pairs: IndexArray
-    n_common: int
-    poses: FloatArray
-    turning: npt.NDArray[np.bool_]
-    T_BT: FloatArray
-    beam_gap_mm: float
-
-    def beam_mm(self, stand_off_mm: float) -> float:
-        """Return the beam's length for a stand-off."""
-        return max(stand_off_mm - self.beam_gap_mm, 0.0)
 
 
 class Clearances(NamedTuple):
@@ -78,63 +47,6 @@ class Clearances(NamedTuple):
 
     clearance_mm: FloatArray
     pair: IndexArray
-
-
-def collision_model(
-    bodies: Bodies, obstacles: Sequence[Obstacle], T_BT: FloatArray, T_FS: FloatArray
-) -> tuple[CollisionModel, tuple[str, ...]]:
-    """Return the model and the name of each of its pairs, such as "probe and table".
-
-    Raises:
-        ValueError: More than one obstacle is a field, or a part turns with joint 4 or 5.
-    """
-    if any(part.frame in _WRIST_FRAMES for part in bodies.parts):
-        raise ValueError("a part moves with frame 4 or 5; both flips of the wrist must put every part in one place")
-    fields = [obstacle.field for obstacle in obstacles if obstacle.field is not None]
-    if len(fields) > 1:
-        raise ValueError(f"{len(fields)} obstacles are meshes, the collision model takes one")
-    pairs, n_common = _pairs(bodies, len(obstacles))
-    beam_start, beam_axis = T_FS[:3, 3], T_FS[:3, 2]
-    model = CollisionModel(
-        bodies=np.array(
-            [
-                *([part.frame, *part.start_mm, *part.end_mm, part.radius_mm] for part in bodies.parts),
-                [FLANGE_FRAME, *beam_start, *(beam_start + beam_axis), bodies.beam.radius_mm],
-            ]
-        ),
-        obstacles=np.array(
-            [[obstacle.kind, *obstacle.size_mm, *np.concatenate(bounding_box(obstacle))] for obstacle in obstacles]
-        ).reshape(-1, 10),
-        field=fields[0] if fields else NO_FIELD,
-        pairs=pairs,
-        n_common=n_common,
-        poses=np.array([obstacle.pose for obstacle in obstacles]).reshape(-1, 4, 4),
-        turning=np.array([obstacle.turning for obstacle in obstacles], dtype=np.bool_),
-        T_BT=np.array(T_BT, dtype=np.float64),
-        beam_gap_mm=bodies.beam.gap_mm,
-    )
-    names = [*(part.name for part in bodies.parts), _BEAM, *(obstacle.name for obstacle in obstacles)]
-    return model, tuple(f"{names[first]} and {names[second]}" for first, second in pairs)
-
-
-def _pairs(bodies: Bodies, n_obstacles: int) -> tuple[IndexArray, int]:
-    links = [part.link for part in bodies.parts]
-    beam = len(links)
-    obstacles = range(beam + 1, beam + 1 + n_obstacles)
-    tool = [body for body, link in enumerate(links) if link >= WRIST_LINK]
-    arm = [body for body, link in enumerate(links) if _FIXED_LINK < link < WRIST_LINK]
-    common = [(body, obstacle) for body in (*tool, beam) for obstacle in obstacles]
-    others = [(body, obstacle) for body in arm for obstacle in obstacles]
-    others += [(a, b) for a in range(beam) for b in range(a) if abs(links[a] - links[b]) > 1]
-    others += [(beam, body) for body, link in enumerate(links) if link < WRIST_LINK]
-    return np.array([*common, *others], dtype=np.int64).reshape(-1, 2), len(common)
-
-
-def base_in_obstacles(model: CollisionModel, table_angles_deg: FloatArray) -> FloatArray:
-    """Return `(n_angles, n_obstacles, 3, 4)`: the base's frame seen from each obstacle's, for each table angle."""
-    table = (model.T_BT @ rotations_z(table_angles_deg))[:, None]
-    in_base = np.where(model.turning[:, None, None], table @ model.poses, model.poses)
-    return np.ascontiguousarray(np.linalg.inv(in_base)[:, :, :3])
 
 
 def clearances(
@@ -189,14 +101,14 @@ def place_bodies(
         placed: Written: `(n_bodies, PLACED)`, x y z of the start, the end and the middle, and half the length.
     """
     for body in range(len(bodies)):
-        f = int(bodies[body, _FRAME])
+        f = int(bodies[body, FRAME])
         if not first <= f <= last:
             continue
         half2 = 0.0
         for row in range(3):
             r0, r1, r2, origin = frames[f, row, 0], frames[f, row, 1], frames[f, row, 2], frames[f, row, 3]
-            start = r0 * bodies[body, _START] + r1 * bodies[body, _START + 1] + r2 * bodies[body, _START + 2]
-            end = r0 * bodies[body, _END] + r1 * bodies[body, _END + 1] + r2 * bodies[body, _END + 2]
+            start = r0 * bodies[body, START] + r1 * bodies[body, START + 1] + r2 * bodies[body, START + 2]
+            end = r0 * bodies[body, END] + r1 * bodies[body, END + 1] + r2 * bodies[body, END + 2]
             if body == len(bodies) - 1:
                 end = start + beam_mm * (end - start)
             placed[body, row] = start + origin
@@ -234,10 +146,10 @@ def nearest_pair(
     least, nearest = enough_mm, -1
     for pair in range(first, last):
         body, other = pairs[pair, 0], pairs[pair, 1]
-        radius = bodies[body, _RADIUS]
+        radius = bodies[body, RADIUS]
         bound = min(least, 0.0) if body == beam else least
         if other <= beam:
-            radius += bodies[other, _RADIUS]
+            radius += bodies[other, RADIUS]
             if _spheres_apart(placed, body, other, bound + radius):
                 continue
             distance = _body_distance(placed, body, other)
@@ -248,14 +160,14 @@ def nearest_pair(
                 continue
             ax, ay, az = _in_frame(obstacle_frames, angle, i, placed, body, 0)
             bx, by, bz = _in_frame(obstacle_frames, angle, i, placed, body, 3)
-            kind = int(obstacles[i, _KIND])
+            kind = int(obstacles[i, KIND])
             if kind == FIELD:
                 distance = field_distance(
                     field_values, field_origin, field_spacing, ax, ay, az, bx, by, bz, bound + radius
                 )
             else:
                 distance = solid_distance(
-                    kind, obstacles[i, _SIZE], obstacles[i, _SIZE + 1], obstacles[i, _SIZE + 2],
+                    kind, obstacles[i, SIZE], obstacles[i, SIZE + 1], obstacles[i, SIZE + 2],
                     ax, ay, az, bx, by, bz, bound + radius,
                 )  # fmt: skip
         # Not by the difference: it would take a distance that is only known to be enough for a smaller one.
@@ -277,9 +189,9 @@ def _spheres_apart(placed: FloatArray, a: int, b: int, enough_mm: float) -> bool
 @kernel
 def _sphere_outside(obstacles: FloatArray, i: int, x: float, y: float, z: float, radius: float) -> bool:
     """Return whether a sphere is outside the box around an obstacle."""
-    dx = max(obstacles[i, _LOWER] - x, x - obstacles[i, _UPPER], 0.0)
-    dy = max(obstacles[i, _LOWER + 1] - y, y - obstacles[i, _UPPER + 1], 0.0)
-    dz = max(obstacles[i, _LOWER + 2] - z, z - obstacles[i, _UPPER + 2], 0.0)
+    dx = max(obstacles[i, LOWER] - x, x - obstacles[i, UPPER], 0.0)
+    dy = max(obstacles[i, LOWER + 1] - y, y - obstacles[i, UPPER + 1], 0.0)
+    dz = max(obstacles[i, LOWER + 2] - z, z - obstacles[i, UPPER + 2], 0.0)
     outside2 = dx * dx + dy * dy + dz * dz
     return bool(outside2 > 0.0 and outside2 >= radius * abs(radius))
 
