@@ -8,7 +8,6 @@ import json
 import zipfile
 import zlib
 from collections.abc import Mapping
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from planner.config_map import ConfigurationMap, ConfigurationMapError
 from planner.configuration import Configuration
 from planner.errors import PlannerError
+from planner.software_version import software_version
 from planner.whole_file import whole_file
 
 MAP_FILE = "map.npz"
@@ -43,7 +43,7 @@ def save_maps(file: Path, maps: Mapping[Configuration, ConfigurationMap]) -> Non
     metadata = {
         "format": _FORMAT,
         "format_version": _FORMAT_VERSION,
-        "software_version": _software_version(),
+        "software_version": software_version(),
         "configurations": [configuration.label for configuration in maps],
         "epsilon": stored[0].epsilon,
         "maps": [dict(each.metadata) for each in stored],
@@ -107,10 +107,3 @@ def _reasons(configuration_map: ConfigurationMap) -> np.ndarray[Any, np.dtype[np
     if configuration_map.reasons is None:
         raise ValueError("a map without reasons cannot be saved")
     return configuration_map.reasons
-
-
-def _software_version() -> str:
-    try:
-        return version("seventh-axis")
-    except PackageNotFoundError:  # run from a checkout that was not installed
-        return "unknown"

@@ -1,7 +1,6 @@
 """A plan on disk: one JSON file with everything needed to run it. The same plan gives the same bytes."""
 
 import json
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +13,9 @@ from planner.joint_path import JointPath
 from planner.plan import Pause, Plan
 from planner.problem import Problem
 from planner.scan import Scan
+from planner.software_version import software_version
 from planner.verification import verify
-from planner.whole_file import whole_file
+from planner.whole_file import write_whole
 
 _FORMAT = "seventh-axis plan"
 _FORMAT_VERSION = 1
@@ -58,7 +58,7 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -
         },
         "provenance": {
             "scan": scan.name,
-            "software_version": _software_version(),
+            "software_version": software_version(),
             "map": _plain({k: v for k, v in problem.map.metadata.items() if k != "reasons"}),
             "map_angles": problem.map.angle_count,
             "map_epsilon": problem.map.epsilon,
@@ -68,8 +68,7 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -
 
 def save_plan(file: Path, document: dict[str, Any]) -> None:
     """Write a plan to `file`, which appears when it is whole."""
-    with whole_file(file) as partial:
-        partial.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_whole(file, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
 
 def load_plan(file: Path) -> Plan:
@@ -113,10 +112,3 @@ def _rounded(array: FloatArray) -> list[Any]:
 def _plain(value: object) -> object:
     """Return the value as JSON can hold it."""
     return json.loads(json.dumps(value, default=str))
-
-
-def _software_version() -> str:
-    try:
-        return version("seventh-axis")
-    except PackageNotFoundError:  # run from a checkout that was not installed
-        return "unknown"

@@ -7,7 +7,6 @@ Beside them lie copies of plan and map, so that the folder says all, and the rob
 import csv
 import io
 import json
-import os
 import shutil
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -23,6 +22,7 @@ from planner.run_record import Correction, Observation, Record, Sent
 from planner.run_verification import RunVerification
 from planner.table_motion import PauseTimes, Phase, TableMotion
 from planner.velocity_profile import MotionCommand
+from planner.whole_file import whole_file, write_whole
 from planner.wire import Wire
 
 _FORMAT = "seventh-axis run"
@@ -127,9 +127,8 @@ def copy_input(folder: Path, plan_file: Path, map_file: Path) -> None:
     for source, name in ((plan_file, PLAN_FILE), (map_file, MAP_FILE)):
         target = folder / name
         if not (target.exists() and target.samefile(source)):
-            partial = target.with_name(f".{name}.{os.getpid()}.partial")
-            shutil.copyfile(source, partial)
-            partial.replace(target)
+            with whole_file(target) as partial:
+                shutil.copyfile(source, partial)
 
 
 def load_run(folder: Path) -> StoredRun:
@@ -159,16 +158,6 @@ def load_run(folder: Path) -> StoredRun:
     run_input = load_run_input(folder / PLAN_FILE).turned(conditions.turns)
     motion = TableMotion(run_input.plan, run_input.problem.limits, conditions.pause_times)
     return StoredRun(run_input, conditions, motion, record)
-
-
-def write_whole(file: Path, text: str) -> None:
-    """Write a file that appears under its name when it is complete."""
-    partial = file.with_name(f".{file.name}.{os.getpid()}.partial")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(file)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _conditions(stored: dict[str, Any]) -> RunConditions:

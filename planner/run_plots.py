@@ -1,6 +1,5 @@
 """Pictures of a run: the path on the map, the motion, and how far it was from the plan."""
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +16,7 @@ from planner.map_colours import coloured
 from planner.run_file import StoredRun
 from planner.run_verification import RunVerification
 from planner.table_motion import Phase
+from planner.whole_file import whole_file
 
 PLANNED, EXECUTED, REFERENCE, TRUE, PAUSE = "#d55e00", "#0072b2", "#7a7f87", "#009e73", "#e7a33e"
 """Colours that remain apart for colour-blind readers."""
@@ -79,12 +79,8 @@ def plot_run(run: StoredRun, checked: RunVerification, file: Path) -> None:
         draw_deviation(deviation, run, checked)
         good = checked.is_verified
         figure.suptitle(f"{run.run_input.name}   {checked.verdict}", color="#2e7d4f" if good else "#b3362b", wrap=True)
-        partial = file.with_name(f".{file.name}.{os.getpid()}.partial")
-        try:
+        with whole_file(file) as partial:
             figure.savefig(partial, format="png", metadata={"Software": None})
-            partial.replace(file)
-        finally:
-            partial.unlink(missing_ok=True)
 
 
 def draw_map(axes: Axes, run: StoredRun, checked: RunVerification) -> None:

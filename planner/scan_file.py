@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from planner.scan_run import Knowledge, Scanned
-from planner.whole_file import whole_file
+from planner.whole_file import write_whole
 
 _FORMAT = "seventh-axis scan"
 _FORMAT_VERSION = 1
@@ -55,8 +55,7 @@ def scan_document(scanned: Scanned) -> dict[str, Any]:
 
 def save_scan(file: Path, document: dict[str, Any]) -> None:
     """Write a scan to `file`, which appears when it is whole."""
-    with whole_file(file) as partial:
-        partial.write_text(json.dumps(document, allow_nan=False) + "\n", encoding="utf-8")
+    write_whole(file, json.dumps(document, allow_nan=False) + "\n")
 
 
 def _calibration(knowledge: Knowledge) -> dict[str, Any]:

@@ -15,3 +15,9 @@ def whole_file(file: Path) -> Iterator[Path]:
         partial.replace(file)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def write_whole(file: Path, text: str) -> None:
+    """Write a text file that appears when it is whole."""
+    with whole_file(file) as partial:
+        partial.write_text(text, encoding="utf-8")

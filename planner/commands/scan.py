@@ -13,7 +13,7 @@ from planner.scan import load_scan, shipped_scans
 from planner.scan_file import save_scan, scan_document
 from planner.scan_report import scan_report, verdict_of
 from planner.scan_run import Scanned, ScanOptions, scan_workpiece, with_mesh
-from planner.whole_file import whole_file
+from planner.whole_file import write_whole
 from protocol import TableError
 
 _INCOMPLETE = 1
@@ -85,8 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         scanned = scan_workpiece(scan, options, out, lambda label: progress_line(label, sys.stderr))
         save_scan(out / "scan.json", scan_document(scanned))
-        with whole_file(out / "report.html") as partial:
-            partial.write_text(scan_report(scanned), encoding="utf-8")
+        write_whole(out / "report.html", scan_report(scanned))
     except TableError as error:
         raise PlannerError(str(error)) from error
     except OSError as error:

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from planner.whole_file import whole_file
+from planner.whole_file import whole_file, write_whole
 
 
 def test_a_file_appears_under_its_name_when_it_is_whole(tmp_path: Path) -> None:
@@ -10,6 +10,11 @@ def test_a_file_appears_under_its_name_when_it_is_whole(tmp_path: Path) -> None:
         partial.write_text("whole")
         assert not (tmp_path / "a.txt").exists()
     assert [file.name for file in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_a_text_is_written_as_utf_8(tmp_path: Path) -> None:
+    write_whole(tmp_path / "a.txt", "24.8 µm\n")
+    assert (tmp_path / "a.txt").read_bytes() == "24.8 µm\n".encode()
 
 
 def test_an_interrupted_file_leaves_what_was_there_and_nothing_else(tmp_path: Path) -> None:

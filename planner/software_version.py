@@ -1,0 +1,11 @@
+"""Which version of the software wrote a file."""
+
+from importlib.metadata import PackageNotFoundError, version
+
+
+def software_version() -> str:
+    """Return the installed version; "unknown" in a checkout that was not installed."""
+    try:
+        return version("seventh-axis")
+    except PackageNotFoundError:
+        return "unknown"
