@@ -20,7 +20,8 @@ tr.sum td { border-top: 1.5px solid #23272d; font-weight: 600; }
 .verdict { font-size: 1.15em; padding: .6em 1em; border-left: 5px solid; background: #f6f7f9; }
 .good { border-color: #2e7d4f; } .bad { border-color: #b3362b; }
 .note { color: #5a616a; max-width: 56em; }
-figure { margin: .8em 0; } figure img { width: 100%; height: auto; }
+figure { margin: .8em 0; } figure img, figure svg { width: 100%; height: auto; }
+details { margin: .6em 0; } summary { cursor: pointer; color: #1f5fa8; }
 """
 
 
@@ -65,3 +66,15 @@ def picture(figure: Figure, what: str) -> str:
     figure.savefig(data, format="png", dpi=130, metadata={"Software": None})
     encoded = base64.b64encode(data.getvalue()).decode("ascii")
     return f'<figure><img alt="{escape(what)}" src="data:image/png;base64,{encoded}"></figure>'
+
+
+def drawing(figure: Figure) -> str:
+    """Return a figure as lines and text that the reader can zoom into."""
+    text = io.StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None})
+    return f"<figure>{text.getvalue()[text.getvalue().index('<svg') :]}</figure>"
+
+
+def details(summary: str, block: str) -> str:
+    """Return a block that opens when its summary is clicked."""
+    return f"<details><summary>{escape(summary)}</summary>{block}</details>"

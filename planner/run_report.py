@@ -1,29 +1,12 @@
 """A run as one HTML file that needs nothing else: verdict, figures, pictures as inline SVG, and all commands."""
 
-import io
-from collections.abc import Iterator, Sequence
-from html import escape
+from collections.abc import Iterator
 
-from matplotlib.figure import Figure
-
+from planner.page import details, drawing, heading, note, page, table, verdict
 from planner.run_file import StoredRun
 from planner.run_plots import deviation_figure, figure_style, map_figure, motion_figure
 from planner.run_verification import RunVerification
 
-_STYLE = """
-body { font: 15px/1.5 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; color: #23272d; background: #fff;
-       max-width: 1020px; margin: 2.2em auto; padding: 0 1.4em; }
-h1 { font-size: 1.6em; margin-bottom: .3em; }
-h2 { font-size: 1.15em; margin: 2em 0 .5em; border-bottom: 1px solid #d5d9de; }
-table { border-collapse: collapse; margin: .6em 0; font-variant-numeric: tabular-nums; }
-th, td { padding: .22em 1.3em .22em 0; text-align: right; border-bottom: 1px solid #e8eaee; }
-th:first-child, td:first-child { text-align: left; } th { color: #5a616a; font-weight: 600; }
-.verdict { font-size: 1.15em; padding: .6em 1em; border-left: 5px solid; background: #f6f7f9; }
-.good { border-color: #2e7d4f; } .bad { border-color: #b3362b; }
-.note { color: #5a616a; max-width: 56em; }
-figure { margin: .8em 0; } figure svg { width: 100%; height: auto; }
-details { margin: .6em 0; } summary { cursor: pointer; color: #1f5fa8; }
-"""
 _NAMES = {
     "encoder": "encoder",
     "latch": "encoder, latched at the trigger (L)",
@@ -35,37 +18,32 @@ _NAMES = {
 
 def run_report(run: StoredRun, checked: RunVerification) -> str:
     """Return the page of a run."""
-    title = f"Run of {run.run_input.name}"
     with figure_style():
-        pictures = [_svg(map_figure(run, checked)), _svg(motion_figure(run)), _svg(deviation_figure(run, checked))]
-    on_map, motion, deviation = (f"<figure>{picture}</figure>" for picture in pictures)
+        on_map = drawing(map_figure(run, checked))
+        motion = drawing(motion_figure(run))
+        deviation = drawing(deviation_figure(run, checked))
     blocks = (
-        f"<h1>{escape(title)}</h1>",
-        f'<p class="verdict {"good" if checked.is_verified else "bad"}">{escape(checked.verdict)}</p>',
-        _table(("", ""), list(_summary(run, checked))),
-        "<h2>On the configuration map</h2>",
-        _note("Grey is allowed, the whiter the better; colours are forbidden. Both paths wrap at 360 degrees."),
+        verdict(checked.verdict, checked.is_verified),
+        table(("", ""), list(_summary(run, checked))),
+        heading("On the configuration map"),
+        note("Grey is allowed, the whiter the better; colours are forbidden. Both paths wrap at 360 degrees."),
         on_map,
-        "<h2>Motion</h2>",
+        heading("Motion"),
         motion,
-        "<h2>Deviation from the plan</h2>",
-        _note(
+        heading("Deviation from the plan"),
+        note(
             "The dashed lines are the tolerance at the scan locations. L and H carry one decimal, so up to 0.05 deg of"
             " their deviation is rounding. The true angle differs from the encoder's by the backlash of the gears."
         ),
         deviation,
-        _table(("in degrees", "at the locations", "anywhere", "rms"), list(_deviations(checked))),
-        "<h2>Cost, Eq. (7)</h2>",
-        _table(("", "acceleration", "speed", "value", "pauses", "total"), list(_costs(checked))),
-        "<h2>Commands</h2>",
-        f"<details><summary>all {len(run.record.sent)} motion commands</summary>{_commands(run)}</details>",
+        table(("in degrees", "at the locations", "anywhere", "rms"), list(_deviations(checked))),
+        heading("Cost, Eq. (7)"),
+        table(("", "acceleration", "speed", "value", "pauses", "total"), list(_costs(checked))),
+        heading("Commands"),
+        details(f"all {len(run.record.sent)} motion commands", _commands(run)),
         _corrections(run),
     )
-    body = "\n".join(blocks)
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
-        f"<style>{_STYLE}</style></head>\n<body>\n{body}\n</body></html>\n"
-    )
+    return page(f"Run of {run.run_input.name}", blocks)
 
 
 def _summary(run: StoredRun, checked: RunVerification) -> Iterator[tuple[str, str]]:
@@ -108,28 +86,12 @@ def _commands(run: StoredRun) -> str:
         for sent in run.record.sent
         for command in (sent.command,)
     ]  # fmt: skip
-    return _table(("time (s)", "phase", "location", "A (deg/s2)", "S (deg/s)", "P (deg)", "late (ms)"), rows)
+    return table(("time (s)", "phase", "location", "A (deg/s2)", "S (deg/s)", "P (deg)", "late (ms)"), rows)
 
 
 def _corrections(run: StoredRun) -> str:
     corrections = run.record.corrections
     if not corrections:
-        return _note("Neither drift nor late commands had to be corrected.")
+        return note("Neither drift nor late commands had to be corrected.")
     times = ", ".join(f"{each.time_s:.1f} s ({each.slip_deg:+.2f} deg)" for each in corrections)
-    return _note(f"For drift or a late command the stream was computed anew at {times}.")
-
-
-def _svg(figure: Figure) -> str:
-    text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None})
-    return text.getvalue()[text.getvalue().index("<svg") :]
-
-
-def _note(text: str) -> str:
-    return f'<p class="note">{escape(text)}</p>'
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    header = "<tr>" + "".join(f"<th>{escape(cell)}</th>" for cell in head) + "</tr>" if any(head) else ""
-    lines = ["<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows]
-    return "<table>" + header + "\n".join(lines) + "</table>"
+    return note(f"For drift or a late command the stream was computed anew at {times}.")
