@@ -154,7 +154,7 @@ def draw_deviation(axes: Axes, run: StoredRun, checked: RunVerification) -> None
         if read and (source == "L" or not seen):
             read_s = np.array([each.time_s for each in read])
             errors = np.array([each.encoder_deg for each in read]) - run.motion.angles_at(read_s)
-            name = "latched (L), one decimal" if source == "L" else "read (H), one decimal"
+            name = "latched (L)" if source == "L" else "read (H)"
             axes.plot(read_s, errors, marker, color="#23272d", markersize=2.5, linestyle="none", label=name)
     for sign in (-1.0, 1.0):
         axes.axhline(sign * checked.tolerance_deg, color="#b3362b", linestyle="--", linewidth=0.8)

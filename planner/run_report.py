@@ -22,6 +22,7 @@ def run_report(run: StoredRun, checked: RunVerification) -> str:
         on_map = drawing(map_figure(run, checked))
         motion = drawing(motion_figure(run))
         deviation = drawing(deviation_figure(run, checked))
+    wire = run.conditions.wire
     blocks = (
         verdict(checked.verdict, checked.is_verified),
         table(("", ""), list(_summary(run, checked))),
@@ -32,8 +33,9 @@ def run_report(run: StoredRun, checked: RunVerification) -> str:
         motion,
         heading("Deviation from the plan"),
         note(
-            "The dashed lines are the tolerance at the scan locations. L and H carry one decimal, so up to 0.05 deg of"
-            " their deviation is rounding. The true angle differs from the encoder's by the backlash of the gears."
+            f"The dashed lines are the tolerance at the scan locations. L and H carry {wire.decimals} decimal(s), so up"
+            f" to {0.5 * wire.quantum:g} deg of their deviation is rounding. The true angle differs from the encoder's"
+            " by the backlash of the gears."
         ),
         deviation,
         table(("in degrees", "at the locations", "anywhere", "rms"), list(_deviations(checked))),
