@@ -138,7 +138,7 @@ def bring_to(table: TableClient, angle_deg: float, limits: Limits, wire: Wire, t
 
 
 class _Run:
-    """One motion under way. Times are those of the motion; `_origin_s` is its 0 on the client's clock."""
+    """One motion under way. Times are those of the motion."""
 
     def __init__(
         self,
@@ -150,7 +150,6 @@ class _Run:
         view: InsideView | None,
         progress: Callable[[int, int], None] | None,
     ) -> None:
-        self.record = Record()
         self._table, self._motion, self._limits, self._wire = table, motion, limits, wire
         self._settings, self._view, self._progress = settings, view, progress
         self._pending_columns = list(enumerate(motion.column_times_s))
@@ -159,7 +158,8 @@ class _Run:
         self._running: TimedCommand | None = None
         self._next_poll_s = self._next_look_s = motion.start_s
         # The first command's S and A are to be sent in peace.
-        self._origin_s = table.clock.now_s() - motion.start_s + settings.lead_s + 4.0 * exchanges_s(wire, _ANY) + 0.1
+        origin_s = table.clock.now_s() - motion.start_s + settings.lead_s + 4.0 * exchanges_s(wire, _ANY) + 0.1
+        self.record = Record(origin_s=origin_s)
 
     def go(self, commands: Sequence[TimedCommand]) -> None:
         """Send all commands in their time, then wait until the table stands."""
@@ -298,7 +298,7 @@ class _Run:
             )
 
     def _now_s(self) -> float:
-        return self._table.clock.now_s() - self._origin_s
+        return self._table.clock.now_s() - self.record.origin_s
 
     def _sleep_until(self, time_s: float) -> None:
         """Sleep, and look inside meanwhile where that is possible."""

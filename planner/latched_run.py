@@ -143,9 +143,7 @@ def run_latched(
     settings = Settings()
     record = execute(table, motion, limits, wire, settings, line, progress)
     line.stop()
-    inside = [each.time_s for each in record.observations if each.source == "inside"]
-    origin_s = line.looked_s[0] - inside[0] if inside else 0.0
-    times_s = line.times_s() - origin_s
+    times_s = line.times_s() - record.origin_s
 
     robot = robot_motion(motion, joints_deg)
     latch_times_s = robot_latch_times_s(times_s, conditions.delay_s, conditions.faults, conditions.seed)

@@ -58,6 +58,7 @@ class Record:
         corrections: where the stream was changed for drift.
         failure: why the motion was stopped; None when it came to its end.
         has_strayed: whether it was stopped because the table was not where it should be.
+        origin_s: the client's clock at time 0 of the motion; it means nothing in a run that was read back.
     """
 
     sent: list[Sent] = field(default_factory=list)
@@ -65,3 +66,4 @@ class Record:
     corrections: list[Correction] = field(default_factory=list)
     failure: str | None = None
     has_strayed: bool = False
+    origin_s: float = 0.0

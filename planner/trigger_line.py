@@ -48,16 +48,10 @@ class TableTruth(NamedTuple):
 
 
 class TriggerLine(InsideView, Protocol):
-    """What a motion under way sees of the probe: a `trigger` to pull, and a look at the table.
-
-    Attributes:
-        looked_s: When the table was looked at, by its clock.
-    """
-
-    looked_s: list[float]
+    """What a motion under way sees of the probe: a `trigger` to pull, and a look at the table."""
 
     def times_s(self) -> FloatArray:
-        """Return when each profile was taken so far, by the table's clock."""
+        """Return when each profile was taken so far, by the clock of the table's port."""
         ...
 
     def stop(self) -> None:
@@ -89,7 +83,6 @@ class ProbeOnPort:
             faults: What goes wrong on the way.
             seed: Chooses these times.
         """
-        self.looked_s: list[float] = []
         self._table, self._view = table, PortView(table)
         self._tick_hz = float(table.config.control.tick_hz)
         self._period_s, self._delay_s = 1.0 / rate_hz, delay_s
@@ -108,7 +101,6 @@ class ProbeOnPort:
 
     def look(self) -> Look:
         """Return where the table is at this moment."""
-        self.looked_s.append(self._table.tick / self._tick_hz)
         return self._view.look()
 
     def trigger(self) -> None:
@@ -172,15 +164,12 @@ class ProbeByHand:
 
     def __init__(self, view: InsideView, clock: Clock) -> None:
         """Take over a view, and the clock of the table's port."""
-        self.looked_s: list[float] = []
         self._view, self._clock = view, clock
         self._fired_s: list[float] = []
 
     def look(self) -> Look:
         """Return where the table is at this moment."""
-        look = self._view.look()
-        self.looked_s.append(self._clock.now_s())
-        return look
+        return self._view.look()
 
     def trigger(self) -> None:
         """Take a profile."""
@@ -191,7 +180,7 @@ class ProbeByHand:
         """Do nothing: it fires when it is told."""
 
     def times_s(self) -> FloatArray:
-        """Return when each profile was taken so far, by the host's clock."""
+        """Return when each profile was taken so far, by the clock of the table's port."""
         return np.array(self._fired_s)
 
     def truth(self) -> None:

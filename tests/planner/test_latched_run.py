@@ -1,10 +1,15 @@
 import numpy as np
 import pytest
 
-from planner.latched_run import LatchedRun, NothingScannedError, ReadingMotion, TriggerConditions
+import emulator  # noqa: F401 - teaches pyserial the port emulator://
+from planner.inside_view import Look, PortView
+from planner.latched_run import LatchedRun, NothingScannedError, ReadingMotion, TriggerConditions, run_latched
 from planner.latching import Drop
-from planner.trigger_line import TriggerFaults
-from tests.planner.latched import LIMITS, latched_run, swinging_plan
+from planner.table_port import open_port
+from planner.trigger_line import ProbeByHand, TriggerFaults
+from planner.wire import Wire
+from protocol import Clock, TableClient
+from tests.planner.latched import LIMITS, joints_along, latched_run, swinging_plan, table_behind
 
 
 @pytest.fixture(scope="module")
@@ -74,3 +79,27 @@ def test_a_table_that_hears_no_trigger_gives_nothing_and_says_why() -> None:
 def test_profiles_are_taken_on_the_path_only(sound: LatchedRun) -> None:
     assert sound.times_s.min() >= 0.0
     assert sound.times_s.max() <= 4.0
+
+
+class SlowView(PortView):
+    """A view into a table through which the first look takes long."""
+
+    def __init__(self, table: object, clock: Clock, first_look_s: float) -> None:
+        super().__init__(table)
+        self._clock, self._delay_s = clock, first_look_s
+
+    def look(self) -> Look:
+        self._clock.sleep_s(self._delay_s)
+        self._delay_s = 0.0
+        return super().look()
+
+
+def test_a_look_that_takes_long_does_not_shift_the_profiles_in_time() -> None:
+    plan, port = swinging_plan(), open_port("emulator://", 9600, 0.5)
+    with TableClient(port, 0.5) as table:
+        line = ProbeByHand(SlowView(table_behind(port), table.clock, first_look_s=0.03), table.clock)
+        run = run_latched(table, line, plan, joints_along(plan), LIMITS, Wire(), TriggerConditions())
+    motion = ReadingMotion(plan, LIMITS, 25.0)
+    off_deg = run.angles_deg - np.array([motion.state_at(time_s).angle_deg for time_s in run.times_s])
+    # The lag of the speed loop and half a step of the wire; 30 ms would be 0.3 deg.
+    assert np.abs(off_deg).max() < 0.15
