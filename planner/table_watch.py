@@ -19,6 +19,8 @@ _QUESTION_BYTES, _ANSWER_BYTES = 2, 10
 _AT_REST_DEG = 0.15
 # What took longer than this has no certain time: the operating system was busy elsewhere.
 _CERTAIN_S = 0.01
+# A reading of the position that has waited this long comes before a trigger.
+_OVERDUE_S = 0.25
 
 
 class StrayedError(TableError):
@@ -88,9 +90,12 @@ class TableWatch:
         reading_s = self._wire.seconds(_QUESTION_BYTES + _ANSWER_BYTES) + self._wire.turnaround_s
         while True:
             column_s = float(self._pending_columns[0][1]) if self._pending_columns else float("inf")
-            poll_s = max(self.now_s(), self._next_poll_s)
-            is_trigger = poll_s + reading_s > column_s
-            begin_s = column_s if is_trigger else poll_s
+            now_s = self.now_s()
+            poll_s = max(now_s, self._next_poll_s)
+            # Triggers come first, but L does not tell whether the table strays: fast ones must not crowd out H.
+            is_overdue = now_s - self._next_poll_s > _OVERDUE_S
+            is_trigger = poll_s + reading_s > column_s and not is_overdue
+            begin_s = max(now_s, column_s) if is_trigger else poll_s
             if begin_s + reading_s > time_s:
                 break
             self.sleep_until(begin_s)

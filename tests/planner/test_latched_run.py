@@ -103,3 +103,9 @@ def test_a_look_that_takes_long_does_not_shift_the_profiles_in_time() -> None:
     off_deg = run.angles_deg - np.array([motion.state_at(time_s).angle_deg for time_s in run.times_s])
     # The lag of the speed loop and half a step of the wire; 30 ms would be 0.3 deg.
     assert np.abs(off_deg).max() < 0.15
+
+
+def test_the_fastest_probe_does_not_hold_the_commands_up() -> None:
+    run = latched_run(TriggerConditions(rate_hz=100.0))
+    assert run.failure is None
+    assert len(run.numbers) > 0.3 * run.triggers
