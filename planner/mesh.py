@@ -71,11 +71,8 @@ def _surface_fault(mesh: trimesh.Trimesh) -> str | None:
 def first_crossing(mesh: trimesh.Trimesh) -> tuple[int, int] | None:
     """Return two triangles (counted from 0) without a common corner of which one's edge pierces the other, or None."""
     triangles = np.asarray(mesh.triangles)
-    tree = mesh.triangles_tree
-    lower, upper = triangles.min(axis=1), triangles.max(axis=1)
-    boxes = np.column_stack((lower, upper))
-    candidates = [(i, j) for i, box in enumerate(boxes) for j in tree.intersection(box) if i != j]
-    pairs = np.array(candidates, dtype=np.int64).reshape(-1, 2)
+    near, counts = mesh.triangles_tree.intersection_v(triangles.min(axis=1), triangles.max(axis=1))
+    pairs = np.column_stack((np.repeat(np.arange(len(triangles)), counts.astype(np.int64)), near))
     shared = (mesh.faces[pairs[:, 0], :, np.newaxis] == mesh.faces[pairs[:, 1], np.newaxis, :]).any(axis=(1, 2))
     pairs = pairs[~shared]
     pierced = np.zeros(len(pairs), dtype=np.bool_)
