@@ -171,7 +171,8 @@ def run_on_port(planned: Planned, options: ScanOptions, progress: Progress) -> L
     wire = Wire(options.decimals, options.baud)
     port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
     with ExitStack() as open_things:
-        table = open_things.enter_context(TableClient(port, options.timeout_s, options.decimals))
+        timeout_s = options.timeout_s * options.time_scale
+        table = open_things.enter_context(TableClient(port, timeout_s, options.decimals))
         line = _trigger_line(port, table, options, open_things)
         return run_latched(
             table, line, planned.plan, planned.joints_deg, planned.limits, wire, options.triggers, progress("motion")

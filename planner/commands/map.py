@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 
+from planner.commands import options
 from planner.config_map import ConfigurationMap
 from planner.configuration import Configuration
 from planner.errors import PlannerError
@@ -14,10 +15,7 @@ from planner.map_file import MAP_FILE, save_maps
 from planner.map_plots import plot_map, plot_map_cylinder
 from planner.map_problem import map_problem
 from planner.progress import progress_line
-from planner.scan import load_scan, shipped_scans
-
-_FEWEST_ANGLES = 8
-_MOST_ANGLES = 36_000
+from planner.scan import load_scan
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -28,28 +26,10 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         description="Rate every location of a scan at every table angle, and say why where the arm cannot be.",
         epilog="example: python -m planner map mould --configuration LEFTY-ABOVE-NOFLIP --out build/mould",
     )
-    parser.add_argument("scan", metavar="SCAN", help=f"a scan file, or one of {', '.join(shipped_scans())}")
-    parser.add_argument(
-        "--configuration", metavar="NAME", default="all", help="such as LEFTY-ABOVE-NOFLIP, or all (the default)"
-    )
-    parser.add_argument(
-        "--angles", type=angle_count, default=360, metavar="COUNT", help="table angles over one turn (default 360)"
-    )
+    options.add_scan(parser)
+    options.add_map(parser, configuration="all")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the map and its pictures")
     parser.set_defaults(run=run)
-
-
-def angle_count(text: str) -> int:
-    """Return the number of table angles that an option asks for."""
-    try:
-        count = int(text)
-    except ValueError:
-        count = 0
-    if not _FEWEST_ANGLES <= count <= _MOST_ANGLES:
-        raise argparse.ArgumentTypeError(
-            f"is {text}; allowed is a whole number from {_FEWEST_ANGLES} to {_MOST_ANGLES}"
-        )
-    return count
 
 
 def run(arguments: argparse.Namespace) -> int:

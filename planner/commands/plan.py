@@ -10,7 +10,7 @@ from pathlib import Path
 
 from planner.arm_motion import arm_motion
 from planner.best_configuration import best_configuration
-from planner.commands.map import angle_count
+from planner.commands import options
 from planner.config_map import ConfigurationMap
 from planner.configuration import Configuration
 from planner.errors import PlannerError
@@ -25,7 +25,7 @@ from planner.planners import DEFAULT_PLANNER, PLANNERS, Planner
 from planner.problem import Problem
 from planner.progress import progress_line
 from planner.reasons import Reason
-from planner.scan import Scan, load_scan, shipped_scans
+from planner.scan import Scan, load_scan
 from planner.smoothing import smooth
 from planner.verification import verify
 
@@ -40,17 +40,12 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         description="Choose the table's motion across a scan's configuration map; exit status 1 where there is none.",
         epilog="example: python -m planner plan mould --compare --out build/mould",
     )
-    parser.add_argument("scan", metavar="SCAN", help=f"a scan file, or one of {', '.join(shipped_scans())}")
+    options.add_scan(parser)
+    options.add_map(parser, configuration="best")
     parser.add_argument(
         "--planner", choices=list(PLANNERS), default=DEFAULT_PLANNER, help=f"default: {DEFAULT_PLANNER}"
     )
-    parser.add_argument(
-        "--configuration", metavar="NAME", default="best", help="such as LEFTY-ABOVE-NOFLIP, or best (the default)"
-    )
     parser.add_argument("--start", type=_angle, metavar="DEG", help="table angle at the first location (default: free)")
-    parser.add_argument(
-        "--angles", type=angle_count, default=360, metavar="COUNT", help="table angles over one turn (default 360)"
-    )
     parser.add_argument("--smooth", action="store_true", help="lower the plan's acceleration peaks afterwards")
     parser.add_argument("--compare", action="store_true", help="run all planners and print a table of them")
     parser.add_argument(

@@ -4,6 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from planner.commands import options
 from planner.errors import PlannerError
 from planner.execute import Settings
 from planner.progress import progress_line
@@ -33,17 +34,20 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--out", metavar="DIR", type=Path, required=True, help="folder for run.json, run.csv and run.png"
     )
     parser.add_argument("--map", metavar="FILE", type=Path, help="the plan's map (default: map.npz beside the plan)")
-    parser.add_argument("--baud", type=int, default=9600, metavar="N", help="default 9600")
-    parser.add_argument("--decimals", type=int, default=1, metavar="N", help="places after the point (default 1)")
+    options.add_wire(parser)
     parser.add_argument(
-        "--timeout", type=float, default=1.0, metavar="S", help="wait this long for a reply (default 1)"
+        "--timeout",
+        type=options.positive_number,
+        default=1.0,
+        metavar="S",
+        help="wait this long for a reply (default 1)",
     )
     parser.add_argument(
         "--lead", type=float, default=Settings().lead_s, metavar="S",
         help="send commands ahead by the encoder's lag behind the reference: 0.0035 for the stand-in (default 0)",
     )  # fmt: skip
     parser.add_argument(
-        "--tolerance", type=float, default=DEFAULT_TOLERANCE_DEG, metavar="DEG",
+        "--tolerance", type=options.positive_number, default=DEFAULT_TOLERANCE_DEG, metavar="DEG",
         help="what the encoder may deviate at a location (default %(default)s)",
     )  # fmt: skip
     parser.add_argument(
@@ -51,18 +55,13 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         action="store_true",
         help="the arm is drawn back until the table stands at the start: any way there is free",
     )
-    parser.add_argument(
-        "--time-scale", type=float, default=1.0, metavar="X", help="that of the stand-in at the port, if it is not 1"
-    )
-    parser.add_argument(
-        "--control", metavar="PATH", type=Path, help="the control channel of a stand-in, to see inside it"
-    )
+    options.add_stand_in(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the plan, write what happened, print the verdict, and return the exit status."""
-    options = RunOptions(
+    asked = RunOptions(
         port=arguments.port,
         baud=arguments.baud,
         decimals=arguments.decimals,
@@ -75,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     show = progress_line("run", sys.stderr)
     try:
-        checked = run_plan(arguments.plan, arguments.out, options, arguments.map, show)
+        checked = run_plan(arguments.plan, arguments.out, asked, arguments.map, show)
     except TableError as error:
         raise PlannerError(str(error)) from error
     except OSError as error:

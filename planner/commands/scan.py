@@ -2,14 +2,13 @@
 
 import argparse
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
-from planner.commands.map import angle_count
+from planner.commands import options
 from planner.errors import PlannerError
 from planner.latched_run import TriggerConditions
 from planner.progress import progress_line
-from planner.scan import load_scan, shipped_scans
+from planner.scan import load_scan
 from planner.scan_file import save_scan, scan_document
 from planner.scan_report import scan_report, verdict_of
 from planner.scan_run import Scanned, ScanOptions, scan_workpiece, with_mesh
@@ -28,35 +27,26 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         " it ended early.",
         epilog="example: python -m planner scan cylinder --decimals 3 --out build/cylinder",
     )
-    parser.add_argument("scan", metavar="SCAN", help=f"a scan file, or one of {', '.join(shipped_scans())}")
+    options.add_scan(parser)
     parser.add_argument("--mesh", type=Path, metavar="FILE", help="another workpiece in the place of the scan's")
     parser.add_argument(
         "--port", metavar="URL", default="emulator://",
         help="emulator:// for a table in simulated time (the default), or a stand-in's port along with --control",
     )  # fmt: skip
-    parser.add_argument("--control", type=Path, metavar="PATH", help="the control channel of a stand-in at --port")
+    options.add_stand_in(parser)
+    options.add_wire(parser)
     parser.add_argument(
-        "--time-scale", type=_positive, default=1.0, metavar="X", help="that of the stand-in at --port, if it is not 1"
-    )
-    parser.add_argument("--baud", type=_whole(0, 1_000_000), default=9600, metavar="N", help="default 9600")
-    parser.add_argument(
-        "--decimals", type=_whole(0, 6), default=1, metavar="N", help="places after the point on the wire (default 1)"
-    )
-    parser.add_argument(
-        "--rate", type=_positive, default=TriggerConditions().rate_hz, metavar="HZ",
+        "--rate", type=options.positive_number, default=TriggerConditions().rate_hz, metavar="HZ",
         help="profiles a second (default %(default)g)",
     )  # fmt: skip
-    parser.add_argument(
-        "--configuration", metavar="NAME", default="best", help="such as LEFTY-ABOVE-NOFLIP, or best (the default)"
-    )
-    parser.add_argument(
-        "--angles", type=angle_count, default=360, metavar="COUNT", help="table angles over one turn (default 360)"
-    )
+    options.add_map(parser, configuration="best")
     parser.add_argument(
         "--exact-calibration", action="store_true", help="align with the true placements instead of calibrated ones"
     )
     parser.add_argument("--xyz", action="store_true", help="write cloud.xyz as well")
-    parser.add_argument("--seed", type=_whole(0, 2**31), default=0, metavar="N", help="chooses all noise (default 0)")
+    parser.add_argument(
+        "--seed", type=options.whole_number(0, 2**31), default=0, metavar="N", help="chooses all noise (default 0)"
+    )
     parser.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="folder for cloud.ply, scan.json and report.html"
     )
@@ -68,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     scan = load_scan(arguments.scan)
     if arguments.mesh is not None:
         scan = with_mesh(scan, arguments.mesh)
-    options = ScanOptions(
+    asked = ScanOptions(
         port=_port(arguments.port, arguments.decimals, arguments.seed),
         baud=arguments.baud,
         decimals=arguments.decimals,
@@ -83,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     out: Path = arguments.out
     try:
-        scanned = scan_workpiece(scan, options, out, lambda label: progress_line(label, sys.stderr))
+        scanned = scan_workpiece(scan, asked, out, lambda label: progress_line(label, sys.stderr))
         save_scan(out / "scan.json", scan_document(scanned))
         write_whole(out / "report.html", scan_report(scanned))
     except TableError as error:
@@ -127,26 +117,3 @@ def _port(url: str, decimals: int, seed: int) -> str:
     told = url.partition("?")[2]
     wanted = [f"{key}={value}" for key, value in (("decimals", decimals), ("seed", seed)) if f"{key}=" not in told]
     return "emulator://?" + "&".join(([told] if told else []) + wanted)
-
-
-def _whole(least: int, most: int) -> Callable[[str], int]:
-    def number(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            value = least - 1
-        if not least <= value <= most:
-            raise argparse.ArgumentTypeError(f"is {text}; allowed is a whole number from {least} to {most}")
-        return value
-
-    return number
-
-
-def _positive(text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = 0.0
-    if not 0.0 < number <= 1000.0:
-        raise argparse.ArgumentTypeError(f"is {text}; allowed is a number above 0 and at most 1000")
-    return number

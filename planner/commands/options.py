@@ -1,0 +1,81 @@
+"""Options that several commands have, and the numbers that options take."""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+from planner.scan import shipped_scans
+
+
+def add_scan(parser: argparse.ArgumentParser) -> None:
+    """Add the scan that the command is about."""
+    parser.add_argument("scan", metavar="SCAN", help=f"a scan file, or one of {', '.join(shipped_scans())}")
+
+
+def add_map(parser: argparse.ArgumentParser, configuration: str) -> None:
+    """Add which configuration maps to compute, and how finely; `configuration` is the default."""
+    parser.add_argument(
+        "--configuration",
+        metavar="NAME",
+        default=configuration,
+        help=f"such as LEFTY-ABOVE-NOFLIP, or {configuration} (the default)",
+    )
+    parser.add_argument(
+        "--angles",
+        type=whole_number(8, 36_000),
+        default=360,
+        metavar="COUNT",
+        help="table angles over one turn (default 360)",
+    )
+
+
+def add_wire(parser: argparse.ArgumentParser) -> None:
+    """Add what the line to the table is like."""
+    parser.add_argument("--baud", type=whole_number(0, 1_000_000), default=9600, metavar="N", help="default 9600")
+    parser.add_argument(
+        "--decimals",
+        type=whole_number(0, 6),
+        default=1,
+        metavar="N",
+        help="places after the point on the wire (default 1)",
+    )
+
+
+def add_stand_in(parser: argparse.ArgumentParser) -> None:
+    """Add what is to be known of a stand-in at the port."""
+    parser.add_argument(
+        "--time-scale",
+        type=positive_number,
+        default=1.0,
+        metavar="X",
+        help="that of the stand-in at --port, if it is not 1",
+    )
+    parser.add_argument(
+        "--control", type=Path, metavar="PATH", help="the control channel of a stand-in at --port, to see inside it"
+    )
+
+
+def whole_number(least: int, most: int) -> Callable[[str], int]:
+    """Return what reads a whole number within bounds."""
+
+    def read(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            number = least - 1
+        if not least <= number <= most:
+            raise argparse.ArgumentTypeError(f"is {text}; allowed is a whole number from {least} to {most}")
+        return number
+
+    return read
+
+
+def positive_number(text: str) -> float:
+    """Return a number above 0, and not beyond anything that can be meant."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0.0 < number <= 1000.0:
+        raise argparse.ArgumentTypeError(f"is {text}; allowed is a number above 0 and at most 1000")
+    return number
