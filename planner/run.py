@@ -1,5 +1,6 @@
 """A plan file carried out and verified, from the check before the first byte to the files that tell of it."""
 
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -11,7 +12,7 @@ from planner.inside_view import ControlView, InsideView, view_of
 from planner.map_file import MAP_FILE
 from planner.robot_motion import robot_motion
 from planner.run_file import RunConditions, StoredRun, copy_input, save_robot, save_run
-from planner.run_input import load_run_input
+from planner.run_input import RunInput, load_run_input
 from planner.run_plots import plot_run
 from planner.run_verification import DEFAULT_TOLERANCE_DEG, RunVerification, verify_run
 from planner.stream import check_it_fits, stream
@@ -36,13 +37,31 @@ class RunOptions(NamedTuple):
     pause_times: PauseTimes = PauseTimes()
 
 
+class Duration(NamedTuple):
+    """How long the table was busy: by the clock of its port, and by the one on the wall."""
+
+    table_s: float
+    wall_s: float
+
+    def __str__(self) -> str:
+        times_real = self.table_s / self.wall_s
+        return f"{self.table_s:.1f} s of the table took {self.wall_s:.2f} s: {times_real:.3g} times real time"
+
+
+class Finished(NamedTuple):
+    """What a run came to, and how long it took."""
+
+    checked: RunVerification
+    duration: Duration
+
+
 def run_plan(
     plan_file: Path,
     out: Path,
     options: RunOptions,
     map_file: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> RunVerification:
+) -> Finished:
     """Carry a plan out on the table at a port, write what happened to `out`, and return what it came to.
 
     Raises:
@@ -59,31 +78,35 @@ def run_plan(
     out.mkdir(parents=True, exist_ok=True)
     copy_input(out, plan_file, map_file)
     with ExitStack() as stack:
-        port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
-        timeout_s = options.timeout_s * options.time_scale
-        table = stack.enter_context(TableClient(port, timeout_s, options.decimals))
-        view = _view(options.control, port, stack)
-        position_deg = table.position_deg()
-        if options.arm_is_away:
-            turns = nearest_turns(position_deg, motion.start_deg)
-        else:
-            turns = turns_to_start(run_input.problem.map, position_deg, motion.start_deg)
+        table, view = _open(options, stack)
+        table_began_s, wall_began_s = table.clock.now_s(), time.perf_counter()
+        turns = _turns(run_input, motion, table.position_deg(), options.arm_is_away)
         run_input = run_input.turned(turns)
         motion = TableMotion(run_input.plan, limits, options.pause_times)
         bring_to(table, motion.start_deg, limits, wire)
-        settings = Settings(lead_s=options.lead_s)
-        record = execute(table, motion, limits, wire, settings, view, progress)
+        record = execute(table, motion, limits, wire, Settings(lead_s=options.lead_s), view, progress)
+        duration = Duration(table.clock.now_s() - table_began_s, time.perf_counter() - wall_began_s)
     conditions = RunConditions(options.port, wire, options.lead_s, options.tolerance_deg, turns, options.pause_times)
     checked = verify_run(run_input, motion, record, options.lead_s, options.tolerance_deg)
     save_run(out, run_input, conditions, motion, record, checked)
     save_robot(out, robot_motion(motion, run_input.joints_deg), record)
     plot_run(StoredRun(run_input, conditions, motion, record), checked, out / "run.png")
-    return checked
+    return Finished(checked, duration)
 
 
-def _view(control: Path | None, port: object, stack: ExitStack) -> InsideView | None:
-    if control is None:
-        return view_of(port)
-    view = ControlView(control)
+def _open(options: RunOptions, stack: ExitStack) -> tuple[TableClient, InsideView | None]:
+    """Return the table at the port, and a view into it where there is one; `stack` closes both."""
+    port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
+    table = stack.enter_context(TableClient(port, options.timeout_s * options.time_scale, options.decimals))
+    if options.control is None:
+        return table, view_of(port)
+    view = ControlView(options.control)
     stack.callback(view.close)
-    return view
+    return table, view
+
+
+def _turns(run_input: RunInput, motion: TableMotion, position_deg: float, arm_is_away: bool) -> int:
+    """Return the full turns to add to the plan, so that its start can be reached from where the table stands."""
+    if arm_is_away:
+        return nearest_turns(position_deg, motion.start_deg)
+    return turns_to_start(run_input.problem.map, position_deg, motion.start_deg)

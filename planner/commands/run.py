@@ -74,12 +74,13 @@ def run(arguments: argparse.Namespace) -> int:
     )
     show = progress_line("run", sys.stderr)
     try:
-        checked = run_plan(arguments.plan, arguments.out, asked, arguments.map, show)
+        checked, duration = run_plan(arguments.plan, arguments.out, asked, arguments.map, show)
     except TableError as error:
         raise PlannerError(str(error)) from error
     except OSError as error:
         raise PlannerError(f"{arguments.out}: the run cannot be written there ({error.strerror or error})") from error
     sys.stdout.write(summary(checked))
+    sys.stderr.write(f"{duration}\n")
     if checked.failure is not None:
         sys.stderr.write(f"what was recorded until then is in {arguments.out}\n")
     if checked.is_verified:

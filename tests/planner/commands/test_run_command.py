@@ -1,6 +1,7 @@
 """`run` and `show` from the command line: in virtual time, on a real pty and over TCP, and with bad input."""
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -44,7 +45,13 @@ def test_a_run_is_verified_and_leaves_its_files(
 ) -> None:
     out = tmp_path / "run"
     assert run(plan_file, out) == 0
-    assert capsys.readouterr().out.startswith("verified: within 0.")
+    shown = capsys.readouterr()
+    assert shown.out.startswith("verified: within 0.")
+    said = re.fullmatch(r"(.*) s of the table took (.*) s: (.*) times real time\n", shown.err)
+    assert said is not None
+    table_s, wall_s, times_real = map(float, said.groups())
+    assert table_s == pytest.approx(result_in(out)["commands"][-1]["time_s"], abs=3.0)
+    assert table_s == pytest.approx(times_real * wall_s, rel=0.1, abs=0.01 * times_real)
     names = {file.name for file in out.iterdir()}
     assert names == {"run.json", "run.csv", "run.png", "plan.json", "map.npz", "robot.csv", "robot.json"}
     assert result_in(out)["verified"]
