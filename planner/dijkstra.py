@@ -19,7 +19,7 @@ from planner.cost import acceleration_cost, speed_cost, value_cost
 from planner.crossing import step_is_allowed
 from planner.kernel import kernel
 from planner.motion import next_angle, next_speed, roll_out
-from planner.plan import NoPlan, Obstacle, Outcome, make_plan, obvious_obstacle
+from planner.plan import Infeasibility, NoPlan, Outcome, make_plan, obvious_infeasibility
 from planner.problem import Problem, Terms
 from planner.state_grid import IndexArray
 
@@ -58,12 +58,12 @@ class LatticePath(NamedTuple):
 
 def dijkstra(problem: Problem, cells: Cells | None = None) -> Outcome:
     """Return the accelerations of the shortest path in the graph, carried out with exact kinematics."""
-    obstacle = obvious_obstacle(problem, NAME)
-    if obstacle is not None:
-        return obstacle
+    no_plan = obvious_infeasibility(problem, NAME)
+    if no_plan is not None:
+        return no_plan
     path = lattice_path(problem, cells or Cells())
     if path is None:
-        return NoPlan(NAME, Obstacle.UNREACHABLE)
+        return NoPlan(NAME, Infeasibility.UNREACHABLE)
     start_deg = path.angles_deg[0] if problem.start_angle_deg is None else problem.start_angle_deg
     start_speed = path.speeds_deg_s[0] if problem.start_speed_deg_s is None else problem.start_speed_deg_s
     angles, speeds = roll_out(float(start_deg), float(start_speed), path.accelerations_deg_s2, problem.step_s)

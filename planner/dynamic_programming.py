@@ -18,7 +18,7 @@ from planner.cost_to_go import CostToGo, cost_from, cost_to_go
 from planner.crossing import step_is_allowed
 from planner.kernel import kernel
 from planner.motion import next_angle, next_speed, roll_out
-from planner.plan import NoPlan, Obstacle, Outcome, Plan, make_plan, obvious_obstacle
+from planner.plan import Infeasibility, NoPlan, Outcome, Plan, make_plan, obvious_infeasibility
 from planner.problem import Problem, Terms
 from planner.state_grid import Grid, default_grid, exact_grid
 
@@ -40,14 +40,14 @@ def dynamic_programming(problem: Problem, grid: Grid | None = None) -> Outcome:
     Without a `grid`, the default grid is tried first and, where it finds no way, a finer one on which nothing is
     interpolated: that one only misses ways that need accelerations in between its own.
     """
-    obstacle = obvious_obstacle(problem, NAME)
-    if obstacle is not None:
-        return obstacle
+    no_plan = obvious_infeasibility(problem, NAME)
+    if no_plan is not None:
+        return no_plan
     for candidate in (default_grid(problem), *fine_grids(problem)) if grid is None else (grid,):
         plan = follow(problem, cost_to_go(problem, candidate))
         if plan is not None:
             return plan
-    return NoPlan(NAME, Obstacle.UNREACHABLE, _first_unreachable_location(problem))
+    return NoPlan(NAME, Infeasibility.UNREACHABLE, _first_unreachable_location(problem))
 
 
 def fine_grids(problem: Problem) -> list[Grid]:

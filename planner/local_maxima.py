@@ -3,7 +3,7 @@
 import numpy as np
 
 from planner.motion import motion_through_angles
-from planner.plan import Outcome, greedy_start, make_plan, obvious_obstacle
+from planner.plan import Outcome, greedy_start, make_plan, obvious_infeasibility
 from planner.problem import Problem
 
 NAME = "local_maxima"
@@ -15,9 +15,9 @@ def local_maxima(problem: Problem) -> Outcome:
     It minds neither limits nor what lies between two locations: a baseline, not a motion to execute. Its speeds and
     accelerations are the only ones that meet these angles under Eq. (3) and (4).
     """
-    obstacle = obvious_obstacle(problem, NAME)
-    if obstacle is not None:
-        return obstacle
+    no_plan = obvious_infeasibility(problem, NAME)
+    if no_plan is not None:
+        return no_plan
     start_deg, speed_deg_s = greedy_start(problem)
     brightest = problem.map.angles_deg[np.argmax(problem.map.values, axis=1)]
     angles = np.unwrap(np.concatenate(([start_deg], brightest[1:])), period=360.0)

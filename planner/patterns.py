@@ -28,7 +28,7 @@ _SPACING = 2.0
 
 
 @dataclass(frozen=True)
-class Coverage:
+class StripLayout:
     """How the strips of a pattern lie.
 
     Attributes:
@@ -58,11 +58,11 @@ class Coverage:
         return np.linspace(-0.5 * beyond, 0.5 * beyond, count) if count > 1 else np.zeros(1)
 
 
-def sphere_meridians(sphere: Sphere, probe: Probe, coverage: Coverage) -> FloatArray:
+def sphere_meridians(sphere: Sphere, probe: Probe, layout: StripLayout) -> FloatArray:
     """Return a zigzag down one meridian and up the next, the line across the meridian."""
     radius = 0.5 * sphere.diameter_mm
-    count = math.ceil(2.0 * math.pi * radius / coverage.pitch_mm(probe.line_width_mm))
-    ends = (coverage.top_polar_deg, coverage.lowest_polar_deg)
+    count = math.ceil(2.0 * math.pi * radius / layout.pitch_mm(probe.line_width_mm))
+    ends = (layout.top_polar_deg, layout.lowest_polar_deg)
     corners = [
         (polar, 360.0 * strip / count) for strip in range(count) for polar in (ends if strip % 2 == 0 else ends[::-1])
     ]
@@ -71,13 +71,13 @@ def sphere_meridians(sphere: Sphere, probe: Probe, coverage: Coverage) -> FloatA
     return _on_sphere(sphere, probe, polar, azimuth, across)
 
 
-def sphere_spiral(sphere: Sphere, probe: Probe, coverage: Coverage) -> FloatArray:
+def sphere_spiral(sphere: Sphere, probe: Probe, layout: StripLayout) -> FloatArray:
     """Return a spiral from the pole down that sinks one strip per turn, the line along the meridian.
 
     It begins and ends in a full turn at one polar angle, or else a wedge at either end would be left out.
     """
-    turn_deg = math.degrees(coverage.pitch_mm(probe.line_width_mm) / (0.5 * sphere.diameter_mm))
-    top, lowest = coverage.top_polar_deg, coverage.lowest_polar_deg
+    turn_deg = math.degrees(layout.pitch_mm(probe.line_width_mm) / (0.5 * sphere.diameter_mm))
+    top, lowest = layout.top_polar_deg, layout.lowest_polar_deg
     turns = (lowest - top) / turn_deg
     corners = [(top, 0.0), (top, 360.0), (lowest, 360.0 * (turns + 1.0)), (lowest, 360.0 * (turns + 2.0))]
     polar, azimuth = np.radians(_filled(corners).T)
@@ -92,29 +92,29 @@ def _on_sphere(sphere: Sphere, probe: Probe, polar: FloatArray, azimuth: FloatAr
     return looking_at(points, normals, lines, probe.stand_off_mm)
 
 
-def cylinder_rings(cylinder: Cylinder, probe: Probe, coverage: Coverage) -> FloatArray:
+def cylinder_rings(cylinder: Cylinder, probe: Probe, layout: StripLayout) -> FloatArray:
     """Return full turns at one height each, from the bottom up, without turning back."""
-    heights = _ring_heights(cylinder, probe, coverage)
+    heights = _ring_heights(cylinder, probe, layout)
     corners = [(360.0 * (ring + end), height) for ring, height in enumerate(heights) for end in (0.0, 1.0)]
     return _on_cylinder(cylinder, probe, corners)
 
 
-def cylinder_helix(cylinder: Cylinder, probe: Probe, coverage: Coverage) -> FloatArray:
+def cylinder_helix(cylinder: Cylinder, probe: Probe, layout: StripLayout) -> FloatArray:
     """Return a helix from the bottom up that climbs one strip per turn.
 
     It begins and ends in a full turn at one height, or else a wedge at either end would be left out.
     """
-    heights = _ring_heights(cylinder, probe, coverage)
+    heights = _ring_heights(cylinder, probe, layout)
     bottom, top, turns = heights[0], heights[-1], len(heights) - 1
     return _on_cylinder(
         cylinder, probe, [(0.0, bottom), (360.0, bottom), (360.0 * (turns + 1), top), (360.0 * (turns + 2), top)]
     )
 
 
-def _ring_heights(cylinder: Cylinder, probe: Probe, coverage: Coverage) -> FloatArray:
-    bottom = min(coverage.bottom_margin_mm, 0.5 * cylinder.height_mm)
+def _ring_heights(cylinder: Cylinder, probe: Probe, layout: StripLayout) -> FloatArray:
+    bottom = min(layout.bottom_margin_mm, 0.5 * cylinder.height_mm)
     lower = max(0.0, bottom - 0.5 * probe.line_width_mm)
-    middles = coverage.strip_centres(cylinder.height_mm - lower, probe.line_width_mm)
+    middles = layout.strip_centres(cylinder.height_mm - lower, probe.line_width_mm)
     return middles + 0.5 * (cylinder.height_mm + lower)
 
 
@@ -128,12 +128,12 @@ def _on_cylinder(cylinder: Cylinder, probe: Probe, corners: list[tuple[float, fl
     return looking_at(points, normals, lines, probe.stand_off_mm)
 
 
-def mould_raster(mould: Mould, probe: Probe, coverage: Coverage) -> FloatArray:
+def mould_raster(mould: Mould, probe: Probe, layout: StripLayout) -> FloatArray:
     """Return a zigzag of strips along the cavity's length, seen from straight above."""
-    return _on_mould(mould, probe, _strips(mould, probe, coverage))
+    return _on_mould(mould, probe, _strips(mould, probe, layout))
 
 
-def mould_crossed(mould: Mould, probe: Probe, coverage: Coverage) -> FloatArray:
+def mould_crossed(mould: Mould, probe: Probe, layout: StripLayout) -> FloatArray:
     """Return the raster along the length, then one across it with the line turned by 90 degrees."""
     across = Mould(
         mould.width_mm,
@@ -143,16 +143,16 @@ def mould_crossed(mould: Mould, probe: Probe, coverage: Coverage) -> FloatArray:
         mould.cavity_length_mm,
         mould.cavity_depth_mm,
     )
-    along = _strips(mould, probe, coverage)
-    crossing = [(-y, x, 90.0, tilt) for x, y, _, tilt in _strips(across, probe, coverage)]
+    along = _strips(mould, probe, layout)
+    crossing = [(-y, x, 90.0, tilt) for x, y, _, tilt in _strips(across, probe, layout)]
     return _on_mould(mould, probe, along + _from_nearer_end(crossing, along[-1]))
 
 
-def mould_tilted(mould: Mould, probe: Probe, coverage: Coverage) -> FloatArray:
+def mould_tilted(mould: Mould, probe: Probe, layout: StripLayout) -> FloatArray:
     """Return the raster with the beam leaning to one side of the travel, then back with it leaning to the other."""
-    strips = _strips(mould, probe, coverage)
-    leaning = [(x, y, turn, coverage.tilt_deg) for x, y, turn, _ in strips]
-    back = [(x, y, turn, -coverage.tilt_deg) for x, y, turn, _ in reversed(strips)]
+    strips = _strips(mould, probe, layout)
+    leaning = [(x, y, turn, layout.tilt_deg) for x, y, turn, _ in strips]
+    back = [(x, y, turn, -layout.tilt_deg) for x, y, turn, _ in reversed(strips)]
     return _on_mould(mould, probe, leaning + back)
 
 
@@ -160,10 +160,10 @@ MouldCorner = tuple[float, float, float, float]
 """Where on the cavity's floor (x, y in mm), how far the line is turned about z and the beam tilted across it (deg)."""
 
 
-def _strips(mould: Mould, probe: Probe, coverage: Coverage) -> list[MouldCorner]:
-    end = max(0.0, 0.5 * mould.cavity_length_mm - coverage.wall_margin_mm)
+def _strips(mould: Mould, probe: Probe, layout: StripLayout) -> list[MouldCorner]:
+    end = max(0.0, 0.5 * mould.cavity_length_mm - layout.wall_margin_mm)
     ends = (-end, end)
-    middles = coverage.strip_centres(mould.cavity_width_mm, probe.line_width_mm)
+    middles = layout.strip_centres(mould.cavity_width_mm, probe.line_width_mm)
     return [
         (x, float(y), 0.0, 0.0) for strip, y in enumerate(middles) for x in (ends if strip % 2 == 0 else ends[::-1])
     ]
@@ -190,7 +190,7 @@ PATTERNS: dict[str, dict[str, Callable[..., FloatArray]]] = {
     "mould": {"crossed": mould_crossed, "raster": mould_raster, "tilted": mould_tilted},
     "sphere": {"meridians": sphere_meridians, "spiral": sphere_spiral},
 }
-"""The patterns of each workpiece class, by name; all take the workpiece, the probe and the coverage."""
+"""The patterns of each workpiece class, by name; all take the workpiece, the probe and the layout."""
 
 
 def _filled(corners: list[tuple[float, ...]] | list[MouldCorner] | list[tuple[float, float]]) -> FloatArray:

@@ -25,7 +25,7 @@ class Pause(NamedTuple):
     to_angle_deg: float
 
 
-class Obstacle(Enum):
+class Infeasibility(Enum):
     """Why there is no plan."""
 
     BLOCKED_LOCATION = "a scan location has no allowed table angle"
@@ -39,19 +39,19 @@ class NoPlan:
 
     Attributes:
         planner: the planner's name.
-        obstacle: the kind of failure.
+        infeasibility: the kind of failure.
         location: the scan location at which it shows, where there is one.
     """
 
     planner: str
-    obstacle: Obstacle
+    infeasibility: Infeasibility
     location: int | None = None
 
     @property
     def reason(self) -> str:
         """The reason in one sentence."""
         where = "" if self.location is None else f" (location {self.location})"
-        return f"{self.planner}: {self.obstacle.value}{where}"
+        return f"{self.planner}: {self.infeasibility.value}{where}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,14 +138,14 @@ def make_plan(
     )
 
 
-def obvious_obstacle(problem: Problem, planner: str) -> NoPlan | None:
+def obvious_infeasibility(problem: Problem, planner: str) -> NoPlan | None:
     """Return why nobody can cross the map, where one look at its columns tells."""
     blocked = problem.map.blocked_locations
     if blocked:
-        return NoPlan(planner, Obstacle.BLOCKED_LOCATION, blocked[0])
+        return NoPlan(planner, Infeasibility.BLOCKED_LOCATION, blocked[0])
     angle = problem.start_angle_deg
     if angle is not None and not problem.map.is_allowed(0, angle):
-        return NoPlan(planner, Obstacle.START_FORBIDDEN, 0)
+        return NoPlan(planner, Infeasibility.START_FORBIDDEN, 0)
     return None
 
 

@@ -13,7 +13,7 @@ from planner.crossing import step_is_allowed
 from planner.errors import PlannerError
 from planner.kernel import kernel
 from planner.motion import limited_acceleration, next_angle, next_speed
-from planner.plan import Outcome, Pause, greedy_start, make_plan, obvious_obstacle
+from planner.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
 from planner.problem import Problem, Terms
 from planner.rotate_when_blocked import nearest_allowed_angle
 from planner.state_grid import Grid, default_grid
@@ -67,9 +67,9 @@ def _shoot(problem: Problem, rays: Rays, name: str, terminal: Callable[[Problem]
     accelerations = ray_accelerations(rays.rays, problem.limits.acceleration_deg_s2)
     if rays.horizon < 1:
         raise RayError(f"the horizon is {rays.horizon} columns; allowed is 1 or more")
-    obstacle = obvious_obstacle(problem, name)
-    if obstacle is not None:
-        return obstacle
+    no_plan = obvious_infeasibility(problem, name)
+    if no_plan is not None:
+        return no_plan
     to_go = terminal(problem)
     angle_deg, speed_deg_s = greedy_start(problem)
     angles, speeds, chosen, paused = _algorithm_2(

@@ -28,7 +28,7 @@ from planner.crossing import RunArray, step_is_allowed
 from planner.errors import PlannerError
 from planner.kernel import kernel
 from planner.motion import next_angle, next_speed
-from planner.plan import Outcome, Pause, greedy_start, make_plan, obvious_obstacle
+from planner.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
 from planner.problem import Problem, Terms
 from planner.state_grid import Grid, default_grid
 
@@ -78,9 +78,9 @@ def receding(problem: Problem, columns_in_view: int = 50, speed_count: int = SPE
     """
     if columns_in_view < 1:
         raise HorizonError(f"the view is {columns_in_view} columns; allowed is 1 or more")
-    obstacle = obvious_obstacle(problem, NAME)
-    if obstacle is not None:
-        return obstacle
+    no_plan = obvious_infeasibility(problem, NAME)
+    if no_plan is not None:
+        return no_plan
     angle_deg, speed_deg_s = greedy_start(problem)
     online = prepare_online_step(problem, speed_count)
     node_cost, sweep = lay_out_columns(problem.terms, online.grid, online.unit)

@@ -4,7 +4,7 @@ import numpy as np
 
 from planner.config_map import column_value, sample_at_or_above, sample_at_or_below
 from planner.kernel import kernel
-from planner.plan import Outcome, Pause, greedy_start, make_plan, obvious_obstacle
+from planner.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
 from planner.problem import Problem, Terms
 
 NAME = "rotate_when_blocked"
@@ -15,9 +15,9 @@ def rotate_when_blocked(problem: Problem) -> Outcome:
 
     A free start is at rest at the brightest angle of the first location; a start in motion pauses at once.
     """
-    obstacle = obvious_obstacle(problem, NAME)
-    if obstacle is not None:
-        return obstacle
+    no_plan = obvious_infeasibility(problem, NAME)
+    if no_plan is not None:
+        return no_plan
     steps = problem.step_count
     angles, speeds = np.empty(steps + 1), np.zeros(steps + 1)
     angles[0], speeds[0] = greedy_start(problem)

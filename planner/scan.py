@@ -20,7 +20,7 @@ from planner.cost import Weights, default_weights
 from planner.errors import PlannerError, ScanFileError, WorkpieceError
 from planner.mesh import load_mesh, radius_about_axis_mm, size_fault
 from planner.motion import Limits
-from planner.patterns import PATTERNS, Coverage
+from planner.patterns import PATTERNS, StripLayout
 from planner.scan_path import ScanPath, at_scan_speed, load_scan_path
 from planner.toml_table import TomlTable
 from planner.value import ValueFunction
@@ -188,23 +188,23 @@ def _read_path(section: TomlTable, folder: Path, probe: Probe, workpiece: Workpi
     patterns = PATTERNS[type(workpiece).__name__.lower()]
     pattern = patterns[section.choice("pattern", tuple(patterns))]
     speed_mm_s = section.number("scan_speed_mm_s", above=0.0)
-    coverage = _read_coverage(section)
+    layout = _read_layout(section)
     section.finish()
-    waypoints = pattern(workpiece, probe, coverage)
+    waypoints = pattern(workpiece, probe, layout)
     return at_scan_speed(waypoints, speed_mm_s, step_s, probe.stand_off_mm, probe.line_width_mm)
 
 
-def _read_coverage(section: TomlTable) -> Coverage:
-    top_polar_deg = section.number("top_polar_deg", Coverage.top_polar_deg, at_least=0.0, at_most=170.0)
-    return Coverage(
-        overlap=section.number("overlap", Coverage.overlap, at_least=0.0, at_most=0.9),
+def _read_layout(section: TomlTable) -> StripLayout:
+    top_polar_deg = section.number("top_polar_deg", StripLayout.top_polar_deg, at_least=0.0, at_most=170.0)
+    return StripLayout(
+        overlap=section.number("overlap", StripLayout.overlap, at_least=0.0, at_most=0.9),
         top_polar_deg=top_polar_deg,
         lowest_polar_deg=section.number(
-            "lowest_polar_deg", Coverage.lowest_polar_deg, above=top_polar_deg, at_most=180.0
+            "lowest_polar_deg", StripLayout.lowest_polar_deg, above=top_polar_deg, at_most=180.0
         ),
-        bottom_margin_mm=section.number("bottom_margin_mm", Coverage.bottom_margin_mm, at_least=0.0),
-        wall_margin_mm=section.number("wall_margin_mm", Coverage.wall_margin_mm, at_least=0.0),
-        tilt_deg=section.number("tilt_deg", Coverage.tilt_deg, at_least=0.0, at_most=60.0),
+        bottom_margin_mm=section.number("bottom_margin_mm", StripLayout.bottom_margin_mm, at_least=0.0),
+        wall_margin_mm=section.number("wall_margin_mm", StripLayout.wall_margin_mm, at_least=0.0),
+        tilt_deg=section.number("tilt_deg", StripLayout.tilt_deg, at_least=0.0, at_most=60.0),
     )
 
 

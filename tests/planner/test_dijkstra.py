@@ -7,7 +7,7 @@ from planner.config_map import ConfigurationMap
 from planner.dijkstra import Cells, dijkstra, lattice_path
 from planner.dynamic_programming import dynamic_programming
 from planner.motion import Limits
-from planner.plan import NoPlan, Obstacle, Plan
+from planner.plan import Infeasibility, NoPlan, Plan
 from planner.problem import Problem
 from planner.synthetic_maps import MapFamily, synthetic_map
 from tests.planner.exhaustive_search import is_forbidden_on_the_way, least_cost
@@ -64,7 +64,7 @@ def test_where_the_graph_has_no_path_there_is_no_plan() -> None:
     values[0, 0] = values[1, 5] = values[2, 5] = 1.0
     outcome = dijkstra(Problem(ConfigurationMap(values)))
     assert isinstance(outcome, NoPlan)
-    assert outcome.obstacle is Obstacle.UNREACHABLE
+    assert outcome.infeasibility is Infeasibility.UNREACHABLE
 
 
 def test_a_path_may_wind_around_the_turn() -> None:

@@ -10,7 +10,7 @@ from planner.cost import Weights
 from planner.cost_to_go import cost_to_go
 from planner.dynamic_programming import MOST_FINE_STATES, dynamic_programming, fine_grids, follow
 from planner.motion import Limits, motion_through_angles
-from planner.plan import NoPlan, Obstacle, Plan, path_cost
+from planner.plan import Infeasibility, NoPlan, Plan, path_cost
 from planner.problem import Problem
 from planner.state_grid import default_grid, exact_grid
 from planner.synthetic_maps import MapFamily, synthetic_map
@@ -140,7 +140,7 @@ def test_a_corridor_that_drifts_faster_than_the_table_turns_is_unreachable_and_s
         values[k, [(centre + offset) % 60 for offset in range(-3, 4)]] = 1.0
     outcome = dynamic_programming(Problem(ConfigurationMap(values), step_s=0.1))
     assert isinstance(outcome, NoPlan)
-    assert outcome.obstacle is Obstacle.UNREACHABLE
+    assert outcome.infeasibility is Infeasibility.UNREACHABLE
     assert outcome.location is not None
     assert 10 <= outcome.location <= 14
     assert isinstance(dynamic_programming(Problem(ConfigurationMap(values[: outcome.location]), step_s=0.1)), Plan)
@@ -189,7 +189,7 @@ def test_a_blocked_location_is_named() -> None:
     values[4] = 0.0
     outcome = dynamic_programming(Problem(ConfigurationMap(values)))
     assert isinstance(outcome, NoPlan)
-    assert (outcome.obstacle, outcome.location) == (Obstacle.BLOCKED_LOCATION, 4)
+    assert (outcome.infeasibility, outcome.location) == (Infeasibility.BLOCKED_LOCATION, 4)
 
 
 def test_a_grid_of_ones_own_is_used() -> None:

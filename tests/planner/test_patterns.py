@@ -6,12 +6,12 @@ import trimesh
 
 from planner.arrays import FloatArray
 from planner.cell import Probe
-from planner.patterns import PATTERNS, Coverage
+from planner.patterns import PATTERNS, StripLayout
 from planner.scan_path import at_scan_speed
 from planner.workpiece import Cylinder, Mould, Sphere, Workpiece
 
 PROBE = Probe()
-COVERAGE = Coverage()
+LAYOUT = StripLayout()
 WORKPIECES: dict[str, Workpiece] = {
     "sphere": Sphere(160.0, middle_mm=(5.0, -10.0, 20.0)),
     "cylinder": Cylinder(140.0, 180.0, middle_mm=(5.0, -10.0, 20.0)),
@@ -20,8 +20,8 @@ WORKPIECES: dict[str, Workpiece] = {
 ALL = [(kind, pattern) for kind, patterns in PATTERNS.items() for pattern in patterns]
 
 
-def waypoints_of(kind: str, pattern: str, coverage: Coverage = COVERAGE) -> FloatArray:
-    return PATTERNS[kind][pattern](WORKPIECES[kind], PROBE, coverage)
+def waypoints_of(kind: str, pattern: str, layout: StripLayout = LAYOUT) -> FloatArray:
+    return PATTERNS[kind][pattern](WORKPIECES[kind], PROBE, layout)
 
 
 def closest_point(mesh: trimesh.Trimesh, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -66,7 +66,7 @@ def test_the_line_passes_over_the_whole_sphere_between_the_polar_angles(pattern:
     centre = np.add(sphere.middle_mm, (0.0, 0.0, 80.0))
     points = sphere.mesh().vertices
     polar = np.degrees(np.arccos((points[:, 2] - centre[2]) / 80.0))
-    wanted = points[(polar > COVERAGE.top_polar_deg + 5.0) & (polar < COVERAGE.lowest_polar_deg - 5.0)]
+    wanted = points[(polar > LAYOUT.top_polar_deg + 5.0) & (polar < LAYOUT.lowest_polar_deg - 5.0)]
     # The line is straight, so its ends stand off the sphere: compare directions from the centre.
     covered = covered_points(waypoints_of("sphere", pattern)) - centre
     assert _greatest_gap(_unit(covered) * 80.0, wanted - centre) < 6.0
@@ -101,8 +101,8 @@ def _greatest_gap(covered: FloatArray, wanted: FloatArray) -> float:
 
 @pytest.mark.parametrize("overlap", [0.0, 0.2, 0.5])
 def test_strips_lie_a_line_width_less_the_overlap_apart_at_most(overlap: float) -> None:
-    coverage = Coverage(overlap=overlap)
-    middles = coverage.strip_centres(300.0, 60.0)
+    layout = StripLayout(overlap=overlap)
+    middles = layout.strip_centres(300.0, 60.0)
     assert np.diff(middles).max() <= 60.0 * (1.0 - overlap) + 1e-9
     assert middles[0] == pytest.approx(-120.0)
     assert middles[-1] == pytest.approx(120.0)
@@ -111,7 +111,7 @@ def test_strips_lie_a_line_width_less_the_overlap_apart_at_most(overlap: float) 
 
 
 def test_a_span_narrower_than_the_line_takes_one_strip_in_its_middle() -> None:
-    np.testing.assert_array_equal(COVERAGE.strip_centres(40.0, 60.0), [0.0])
+    np.testing.assert_array_equal(LAYOUT.strip_centres(40.0, 60.0), [0.0])
 
 
 def test_a_crossed_raster_turns_the_line_by_a_right_angle() -> None:

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from planner.config_map import ConfigurationMap
 from planner.motion import roll_out
-from planner.plan import Obstacle, Pause, Plan, greedy_start, make_plan, obvious_obstacle
+from planner.plan import Infeasibility, Pause, Plan, greedy_start, make_plan, obvious_infeasibility
 from planner.problem import Problem
 from planner.synthetic_maps import MapFamily, synthetic_map
 from tests.planner.exhaustive_search import motion
@@ -44,16 +44,18 @@ def test_a_plan_is_read_only() -> None:
 def test_a_blocked_location_is_named() -> None:
     values = np.ones((5, 4))
     values[3] = 0.0
-    obstacle = obvious_obstacle(Problem(ConfigurationMap(values)), "test")
-    assert obstacle is not None
-    assert obstacle.obstacle is Obstacle.BLOCKED_LOCATION
-    assert "location 3" in obstacle.reason
+    no_plan = obvious_infeasibility(Problem(ConfigurationMap(values)), "test")
+    assert no_plan is not None
+    assert no_plan.infeasibility is Infeasibility.BLOCKED_LOCATION
+    assert "location 3" in no_plan.reason
 
 
 def test_a_forbidden_start_is_told() -> None:
-    obstacle = obvious_obstacle(Problem(ConfigurationMap(np.array([[0.0, 1.0]] * 2)), start_angle_deg=360.0), "test")
-    assert obstacle is not None
-    assert obstacle.obstacle is Obstacle.START_FORBIDDEN
+    no_plan = obvious_infeasibility(
+        Problem(ConfigurationMap(np.array([[0.0, 1.0]] * 2)), start_angle_deg=360.0), "test"
+    )
+    assert no_plan is not None
+    assert no_plan.infeasibility is Infeasibility.START_FORBIDDEN
 
 
 def test_a_free_start_is_at_rest_where_it_is_brightest() -> None:

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.config_map import ConfigurationMap
-from planner.plan import NoPlan, Obstacle, Pause, Plan
+from planner.plan import Infeasibility, NoPlan, Pause, Plan
 from planner.problem import Problem
 from planner.rotate_when_blocked import nearest_allowed_angle, rotate_when_blocked
 from planner.synthetic_maps import MapFamily, synthetic_map
@@ -57,7 +57,7 @@ def test_the_angle_found_is_allowed_and_none_of_the_samples_is_nearer(seed: int,
 def test_a_location_without_any_allowed_angle_is_a_result_with_its_reason() -> None:
     outcome = rotate_when_blocked(Problem(blocked_at(2, *range(12)), start_angle_deg=60.0))
     assert isinstance(outcome, NoPlan)
-    assert (outcome.obstacle, outcome.location) == (Obstacle.BLOCKED_LOCATION, 2)
+    assert (outcome.infeasibility, outcome.location) == (Infeasibility.BLOCKED_LOCATION, 2)
 
 
 def test_a_start_in_motion_comes_to_rest_in_a_pause() -> None:
