@@ -7,9 +7,8 @@ the workpiece (W), and both stand in the robot's base (B).
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.cell import Cell
 from planner.transforms import rigid_inverse, rotations_z
 
@@ -46,7 +45,7 @@ def probe_poses(calibration: Calibration, T_BF: FloatArray, angles_deg: FloatArr
     return np.asarray(T_WB @ T_BF @ calibration.T_FS)
 
 
-def aligned(T_WS: FloatArray, profiles: npt.NDArray[np.int64], points_S: FloatArray) -> FloatArray:
+def aligned(T_WS: FloatArray, profiles: IndexArray, points_S: FloatArray) -> FloatArray:
     """Return points `(m, 3)` in frame W, each taken from frame S by the pose of its profile.
 
     Args:

@@ -3,5 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 CodeArray = npt.NDArray[np.uint8]
+FloatArray = npt.NDArray[np.float64]
+IndexArray = npt.NDArray[np.int64]

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner.arm import Arm, link_frames
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.bodies import FLANGE_FRAME
 from planner.capsule import segment_distance
 from planner.collision_model import (
@@ -25,7 +25,6 @@ from planner.collision_model import (
     START,
     UPPER,
     CollisionModel,
-    IndexArray,
     base_in_obstacles,
 )
 from planner.kernel import kernel

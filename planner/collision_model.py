@@ -8,15 +8,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from planner.arrays import FloatArray
+from planner.arrays import BoolArray, FloatArray, IndexArray
 from planner.bodies import FLANGE_FRAME, WRIST_LINK, Bodies
 from planner.obstacles import Obstacle, bounding_box
 from planner.signed_distance_field import NO_FIELD, SignedDistanceField
 from planner.transforms import rotations_z
-
-IndexArray = npt.NDArray[np.int64]
 
 # The columns of the bodies' table: the frame that a body moves with, its ends there in mm, its radius in mm.
 FRAME, START, END, RADIUS = 0, 1, 4, 7
@@ -52,7 +49,7 @@ class CollisionModel(NamedTuple):
     pairs: IndexArray
     n_common: int
     poses: FloatArray
-    turning: npt.NDArray[np.bool_]
+    turning: BoolArray
     T_BT: FloatArray
     beam_gap_mm: float
 

@@ -9,14 +9,10 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
-from planner.arrays import FloatArray
+from planner.arrays import BoolArray, CodeArray, FloatArray
 from planner.errors import PlannerError
 from planner.kernel import kernel
-
-BoolArray = npt.NDArray[np.bool_]
-ReasonArray = npt.NDArray[np.uint8]
 
 # sin(pi)**0.2, Eq. (1) at the end of a joint's range in floating point, is 6.6e-4 and still means "forbidden".
 DEFAULT_EPSILON = 1e-3
@@ -106,7 +102,7 @@ class ConfigurationMap:
     """
 
     values: FloatArray
-    reasons: ReasonArray | None = None
+    reasons: CodeArray | None = None
     epsilon: float = DEFAULT_EPSILON
     metadata: Mapping[str, object] = field(default_factory=dict)
 
@@ -180,7 +176,7 @@ def _check_values(values: FloatArray) -> None:
         )
 
 
-def _frozen_reasons(reasons: ReasonArray, shape: tuple[int, ...]) -> ReasonArray:
+def _frozen_reasons(reasons: CodeArray, shape: tuple[int, ...]) -> CodeArray:
     frozen = np.array(reasons, dtype=np.uint8, order="C")
     if frozen.shape != shape:
         raise ConfigurationMapError(

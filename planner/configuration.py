@@ -5,10 +5,9 @@ import re
 from enum import IntEnum
 
 import numpy as np
-import numpy.typing as npt
 
 from planner.arm import Arm
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.errors import ConfigurationNameError
 
 
@@ -61,7 +60,7 @@ class Configuration(IntEnum):
             ) from None
 
 
-def configurations(arm: Arm, joints: FloatArray) -> npt.NDArray[np.int64]:
+def configurations(arm: Arm, joints: FloatArray) -> IndexArray:
     """Return the slot `(n,)` of the configuration that each row of joints `(n, 6)`, in radians, is in.
 
     LEFTY when the wrist centre lies ahead of axis 1; ABOVE when the elbow bends down from the stretched arm (up, for

@@ -12,13 +12,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from planner.arrays import IndexArray
 from planner.config_map import SAMPLE_TOLERANCE, column_value, sample_at_or_above, sample_at_or_below
 from planner.cost import acceleration_cost, speed_cost, value_cost
 from planner.crossing import RunArray, crossing_is_allowed
 from planner.kernel import kernel
 from planner.motion import swept_angles
 from planner.problem import Problem, Terms
-from planner.state_grid import Grid, GridError, IndexArray
+from planner.state_grid import Grid, GridError
 
 CostArray = npt.NDArray[np.float32]
 

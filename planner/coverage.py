@@ -6,15 +6,12 @@ cloud's density. A point that was never measured keeps the condition that it cam
 """
 
 import numpy as np
-import numpy.typing as npt
 import trimesh
 
-from planner.arrays import FloatArray
-from planner.probe import CodeArray, LaserProbe, Sight, sight
+from planner.arrays import CodeArray, FloatArray, IndexArray
+from planner.probe import LaserProbe, Sight, sight
 from planner.ray_casting import RayCaster
 from planner.transforms import rigid_inverse
-
-IndexArray = npt.NDArray[np.int64]
 
 SAMPLES = 5000
 

@@ -9,7 +9,8 @@ the one at or above `highest`.
 import numpy as np
 import numpy.typing as npt
 
-from planner.config_map import BoolArray, sample_at_or_above, sample_at_or_below, wrapped
+from planner.arrays import BoolArray
+from planner.config_map import sample_at_or_above, sample_at_or_below, wrapped
 from planner.kernel import kernel
 from planner.motion import swept_angles
 

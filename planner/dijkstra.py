@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra as shortest_paths
 
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.config_map import column_value
 from planner.cost import acceleration_cost, speed_cost, value_cost
 from planner.crossing import step_is_allowed
@@ -21,7 +21,6 @@ from planner.kernel import kernel
 from planner.motion import next_angle, next_speed, roll_out
 from planner.plan import Infeasibility, NoPlan, Outcome, make_plan, obvious_infeasibility
 from planner.problem import Problem, Terms
-from planner.state_grid import IndexArray
 
 NAME = "dijkstra"
 
@@ -106,7 +105,7 @@ def _offset(problem: Problem) -> float:
     return problem.greatest_step_cost
 
 
-def _start_nodes(problem: Problem, cells: Cells) -> npt.NDArray[np.int64]:
+def _start_nodes(problem: Problem, cells: Cells) -> IndexArray:
     """Return the nodes of column 0 that a path may start from."""
     step_deg = 360.0 / cells.angle_count
     angles = np.arange(cells.angle_count)
@@ -121,7 +120,7 @@ def _start_nodes(problem: Problem, cells: Cells) -> npt.NDArray[np.int64]:
 
 
 def _graph_with_source(
-    costs: FloatArray, targets: npt.NDArray[np.int32], row_ends: IndexArray, sources: npt.NDArray[np.int64]
+    costs: FloatArray, targets: npt.NDArray[np.int32], row_ends: IndexArray, sources: IndexArray
 ) -> csr_array:
     """Return the graph with one more node, the last, from which all starts are one edge of cost 1 away."""
     count = len(row_ends)

@@ -14,11 +14,10 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import trimesh
 
 from planner.alignment import Calibration, aligned, probe_poses
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.latched_run import LatchedRun
 from planner.probe import Profiles
 
@@ -116,7 +115,7 @@ class Samples:
     def __init__(self, most: int = SAMPLES) -> None:
         """Hold up to `most` points."""
         self._most, self._every, self._passed = most, 1, 0
-        self._kept: list[tuple[npt.NDArray[np.int64], Profiles]] = []
+        self._kept: list[tuple[IndexArray, Profiles]] = []
         self.count = 0
 
     def take(self, first_row: int, profiles: Profiles) -> None:
@@ -130,7 +129,7 @@ class Samples:
             for each in kept:
                 self._keep(*each)
 
-    def _keep(self, order: npt.NDArray[np.int64], profiles: Profiles) -> None:
+    def _keep(self, order: IndexArray, profiles: Profiles) -> None:
         chosen = order % self._every == 0
         self._kept.append((order[chosen], Profiles._make(part[chosen] for part in profiles)))
         self.count += int(chosen.sum())

@@ -9,9 +9,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.errors import PlannerError
 from planner.execute import Settings, bring_to, execute
 from planner.latching import Drop, RobotLatch, TableReading, Tolerances, Trigger, pair
@@ -71,7 +70,7 @@ class LatchedRun:
         failure: Why the motion ended early; None when it came to its end.
     """
 
-    numbers: npt.NDArray[np.int64]
+    numbers: IndexArray
     times_s: FloatArray
     joints_deg: FloatArray
     angles_deg: FloatArray

@@ -12,9 +12,8 @@ from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 
 # How many readings before and after tell how far the table is off its plan at a trigger.
 _NEIGHBOURS = 7
@@ -72,7 +71,7 @@ class Pairing(NamedTuple):
         dropped: The others.
     """
 
-    numbers: npt.NDArray[np.int64]
+    numbers: IndexArray
     joints_deg: FloatArray
     angles_deg: FloatArray
     dropped: dict[int, Drop]

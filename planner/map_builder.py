@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner.arm import link_frames
-from planner.arrays import CodeArray, FloatArray
+from planner.arrays import CodeArray, FloatArray, IndexArray
 from planner.bodies import FLANGE_FRAME
 from planner.clearance import ARM_FRAMES, PLACED, nearest_pair, place_bodies
 from planner.collision_model import base_in_obstacles
@@ -102,10 +102,10 @@ class _Cells(NamedTuple):
     T_TF: FloatArray
     value: FloatArray
     ranges: FloatArray
-    slots: npt.NDArray[np.int64]
+    slots: IndexArray
     beam_mm: float
     n_common: int
-    pairs: npt.NDArray[np.int64]
+    pairs: IndexArray
     bodies: FloatArray
     obstacles: FloatArray
     field_values: npt.NDArray[np.float32]
@@ -175,7 +175,7 @@ def _rates(factor: UserFactor, poses: RatedPoses) -> FloatArray:
 @kernel
 def _rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between would pass twenty of them on
     arm: FloatArray, table_poses: FloatArray, T_TF: FloatArray, value: FloatArray, ranges: FloatArray,
-    slots: npt.NDArray[np.int64], beam_mm: float, n_common: int, pairs: npt.NDArray[np.int64], bodies: FloatArray,
+    slots: IndexArray, beam_mm: float, n_common: int, pairs: IndexArray, bodies: FloatArray,
     obstacles: FloatArray, field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
     obstacle_frames: FloatArray, first: int,
     values: FloatArray, reasons: CodeArray, joints_seen: FloatArray, clearance_seen: FloatArray,

@@ -7,10 +7,9 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.colors import to_rgb
 
-from planner.arrays import FloatArray
+from planner.arrays import CodeArray, FloatArray
 from planner.config_map import ConfigurationMap
 from planner.map_reasons import FIRST_PAIR, FIRST_USER_FACTOR
 from planner.reasons import Reason
@@ -58,7 +57,7 @@ def coloured(configuration_map: ConfigurationMap) -> tuple[FloatArray, list[Lege
     return image, [LegendEntry(text, colour, share) for (text, colour), share in shares.items()]
 
 
-def _by_frequency(reasons: npt.NDArray[np.uint8]) -> list[tuple[int, int, str]]:
+def _by_frequency(reasons: CodeArray) -> list[tuple[int, int, str]]:
     """Return the codes in a map with their counts and colours, the most frequent first."""
     codes, counts = np.unique(reasons[reasons != Reason.REACHED], return_counts=True)
     order = np.argsort(-counts, kind="stable")

@@ -3,10 +3,9 @@
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import trimesh
 
-from planner.arrays import FloatArray
+from planner.arrays import BoolArray, FloatArray
 from planner.errors import WorkpieceError
 
 # A part that a probe with a 60 mm line and an arm of 650 mm reach can be meant for.
@@ -84,7 +83,7 @@ def first_crossing(mesh: trimesh.Trimesh) -> tuple[int, int] | None:
     return (int(pairs[first[0], 0]), int(pairs[first[0], 1])) if len(first) else None
 
 
-def _segments_pierce(start: FloatArray, end: FloatArray, triangles: FloatArray) -> npt.NDArray[np.bool_]:
+def _segments_pierce(start: FloatArray, end: FloatArray, triangles: FloatArray) -> BoolArray:
     """Return whether each open segment passes through its closed triangle (Moeller and Trumbore, 1997)."""
     edge_1, edge_2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     direction = end - start

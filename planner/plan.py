@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.arrays import FloatArray
-from planner.config_map import BoolArray, column_value
+from planner.arrays import BoolArray, FloatArray
+from planner.config_map import column_value
 from planner.cost import PathCost, acceleration_cost, speed_cost, value_cost
 from planner.kernel import kernel
 from planner.problem import Problem, Terms

@@ -6,9 +6,8 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.whole_file import whole_file
 
 # A vertex as it lies in the file. Single precision leaves 0.03 micrometres at 500 mm.
@@ -35,7 +34,7 @@ class PlyWriter:
         self._file = self._stack.enter_context(whole_file(file)).open("wb")
         self._file.write(self._header())
 
-    def write(self, points: FloatArray, beams: FloatArray, profiles: npt.NDArray[np.int64]) -> None:
+    def write(self, points: FloatArray, beams: FloatArray, profiles: IndexArray) -> None:
         """Append points `(m, 3)`, unit vectors `(m, 3)` and numbers `(m,)`."""
         vertices = np.empty(len(points), dtype=_VERTEX)
         columns = np.column_stack((points, beams))

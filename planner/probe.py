@@ -10,9 +10,8 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from planner.arrays import FloatArray
+from planner.arrays import CodeArray, FloatArray, IndexArray
 from planner.cell import Probe
 from planner.ray_casting import RayCaster
 
@@ -25,9 +24,6 @@ class Sight(IntEnum):
     INCIDENCE = 2
     OCCLUDED = 3
     SEEN = 4
-
-
-CodeArray = npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -82,7 +78,7 @@ class Profiles(NamedTuple):
         normals_W: `(m, 3)` outward normals of the surface there.
     """
 
-    profiles: npt.NDArray[np.int64]
+    profiles: IndexArray
     points_S: FloatArray
     rays_S: FloatArray
     noise_mm: FloatArray
@@ -94,7 +90,7 @@ def measure(
     caster: RayCaster,
     probe: LaserProbe,
     T_WS: FloatArray,
-    numbers: npt.NDArray[np.int64] | None = None,
+    numbers: IndexArray | None = None,
     seed: int = 0,
 ) -> Profiles:
     """Return the profiles that the probe takes of a surface.
@@ -131,7 +127,7 @@ def sight(
     caster: RayCaster,
     probe: LaserProbe,
     T_WS: FloatArray,
-    profiles: npt.NDArray[np.int64],
+    profiles: IndexArray,
     points: FloatArray,
     normals: FloatArray,
     depths_mm: FloatArray,

@@ -13,12 +13,10 @@ import trimesh
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
-from planner.arrays import FloatArray
+from planner.arrays import BoolArray, FloatArray, IndexArray
 
 # How far off its surface a point's own ray starts, so that it does not meet the triangle that it starts from.
 _LIFT_MM = 0.01
-
-BoolArray = npt.NDArray[np.bool_]
 
 
 class Hits(NamedTuple):
@@ -29,7 +27,7 @@ class Hits(NamedTuple):
         distances_mm: `(n,)` along each ray, in units of its direction's length; NaN where it meets nothing.
     """
 
-    triangles: npt.NDArray[np.int64]
+    triangles: IndexArray
     distances_mm: FloatArray
 
 

@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.arrays import FloatArray
-from planner.config_map import BoolArray
+from planner.arrays import BoolArray, FloatArray
 from planner.cost_to_go import ANY_COST, cost_to_go
 from planner.problem import Problem
 from planner.state_grid import default_grid

@@ -5,13 +5,12 @@ from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
 import trimesh
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
 
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.coverage import Coverage
 from planner.error_account import Account
 from planner.probe import Sight
@@ -45,8 +44,8 @@ _STYLE: dict[Any, Any] = {
     "figure.facecolor": "white",
 }
 
-Image = npt.NDArray[np.float64]
-PixelArray = npt.NDArray[np.int64]
+Image = FloatArray
+PixelArray = IndexArray
 
 
 class _View(NamedTuple):

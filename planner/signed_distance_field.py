@@ -37,7 +37,7 @@ class SignedDistanceField(NamedTuple):
     """
 
     values_mm: NDArray[np.float32]
-    origin_mm: NDArray[np.float64]
+    origin_mm: FloatArray
     spacing_mm: float
 
 
@@ -141,9 +141,7 @@ def _load(file: Path) -> SignedDistanceField | None:
 
 
 @kernel
-def look_up(
-    values: NDArray[np.float32], origin: NDArray[np.float64], spacing: float, x: float, y: float, z: float
-) -> float:
+def look_up(values: NDArray[np.float32], origin: FloatArray, spacing: float, x: float, y: float, z: float) -> float:
     """Return the signed distance in mm at a point of the mesh's frame.
 
     On the grid it is trilinear, so at most half a cell's diagonal off. Beyond it, it is a lower bound: the way to
@@ -168,7 +166,7 @@ def look_up(
 
 @kernel
 def field_distance(
-    values: NDArray[np.float32], origin: NDArray[np.float64], spacing: float,
+    values: NDArray[np.float32], origin: FloatArray, spacing: float,
     ax: float, ay: float, az: float, bx: float, by: float, bz: float, enough_mm: float,
 ) -> float:  # fmt: skip
     """Return a lower bound in mm of the least signed distance of the segment a-b from the mesh.

@@ -13,15 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.arrays import FloatArray
-from planner.config_map import BoolArray, column_value
+from planner.arrays import BoolArray, FloatArray, IndexArray
+from planner.config_map import column_value
 from planner.cost import acceleration_cost, speed_cost, value_cost
 from planner.crossing import step_is_allowed
 from planner.kernel import kernel
 from planner.motion import next_angle, next_speed, roll_out
 from planner.plan import Plan, make_plan
 from planner.problem import Problem, Terms
-from planner.state_grid import IndexArray
 
 # Lengths of a wave's blocks in steps: the short ones take off peaks, the long ones move curves.
 BLOCK_LENGTHS = (1, 2, 3, 5, 8)

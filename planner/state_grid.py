@@ -4,14 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.config_map import SAMPLE_TOLERANCE
 from planner.errors import PlannerError
 from planner.problem import Problem
-
-IndexArray = npt.NDArray[np.int64]
 
 
 class GridError(PlannerError):

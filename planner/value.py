@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from planner.arm import Arm
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.configuration import Configuration
 from planner.errors import ScanFileError
 from planner.kernel import kernel
@@ -51,7 +50,7 @@ class RatedPoses(NamedTuple):
 
     joints: FloatArray
     clearance_mm: FloatArray
-    locations: npt.NDArray[np.int64]
+    locations: IndexArray
     table_angles_deg: FloatArray
 
 
