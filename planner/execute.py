@@ -5,13 +5,13 @@ One code path for a pty, TCP, a serial device and simulated time: the clock come
 whatever happens.
 """
 
-from collections.abc import Callable
 from contextlib import suppress
 from typing import NamedTuple
 
 from planner.errors import PlannerError
 from planner.inside_view import InsideView
 from planner.motion import Limits
+from planner.progress import Progress
 from planner.run_record import Record, Sent
 from planner.stream import TimedCommand
 from planner.stream_correction import CorrectedStream
@@ -64,7 +64,7 @@ def execute(
     wire: Wire,
     settings: Settings | None = None,
     view: InsideView | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Record:
     """Run a motion on a table that stands at its start, and return what happened.
 

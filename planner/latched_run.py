@@ -3,7 +3,7 @@
 Nothing is measured here yet; this is the part that needs the table, and it ends with one row for each profile.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -16,6 +16,7 @@ from planner.execute import Settings, bring_to, execute
 from planner.latching import Drop, RobotLatch, TableReading, Tolerances, Trigger, pair
 from planner.motion import Limits
 from planner.plan import Plan
+from planner.progress import Progress
 from planner.robot_motion import RobotMotion, robot_motion
 from planner.run_record import Record
 from planner.table_motion import Phase, TableMotion
@@ -118,7 +119,7 @@ def run_latched(
     limits: Limits,
     wire: Wire,
     conditions: TriggerConditions,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> LatchedRun:
     """Make the motion of a plan, with the probe firing, and return what was latched.
 

@@ -6,7 +6,7 @@ Memory grows with the maps alone.
 """
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from planner.inverse_kinematics import inverse
 from planner.kernel import kernel
 from planner.map_problem import MapProblem
 from planner.map_reasons import FIRST_PAIR, FIRST_USER_FACTOR, reason_texts
+from planner.progress import Progress
 from planner.reasons import Reason
 from planner.value import (
     CLEARANCE_EXPONENT,
@@ -35,8 +36,6 @@ from planner.value import (
     joints_value,
     wrist_factor,
 )
-
-Progress = Callable[[int, int], None]
 
 _REACHED = int(Reason.REACHED)
 _SINGULAR = int(Reason.SINGULAR)

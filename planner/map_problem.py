@@ -1,12 +1,12 @@
 """What a configuration map depends on, put together from a scan."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from planner.arrays import FloatArray
 from planner.cell import Cell
 from planner.collision_model import CollisionModel, collision_model
 from planner.obstacles import cell_obstacles, workpiece_obstacle
+from planner.progress import Progress
 from planner.scan import Scan
 from planner.value import ValueFunction
 
@@ -32,7 +32,7 @@ class MapProblem:
     value: ValueFunction
 
 
-def map_problem(scan: Scan, progress: Callable[[int, int], None] | None = None) -> MapProblem:
+def map_problem(scan: Scan, progress: Progress | None = None) -> MapProblem:
     """Return the map problem of a scan.
 
     Args:

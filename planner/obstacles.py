@@ -3,13 +3,13 @@
 Shapes are exact solids, or the signed distance field of a mesh.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from planner.arrays import FloatArray
 from planner.cell import Cell
+from planner.progress import Progress
 from planner.scan import Scan
 from planner.signed_distance_field import SignedDistanceField, cached_field
 from planner.solid import BOX, CAPSULE, CYLINDER
@@ -93,7 +93,7 @@ def cell_obstacles(cell: Cell) -> tuple[Obstacle, ...]:
     return disc, plinth, floor
 
 
-def workpiece_obstacle(scan: Scan, progress: Callable[[int, int], None] | None = None) -> Obstacle:
+def workpiece_obstacle(scan: Scan, progress: Progress | None = None) -> Obstacle:
     """Return a scan's workpiece: an ideal sphere or cylinder as itself, anything else as the field of its mesh.
 
     Args:

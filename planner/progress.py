@@ -3,10 +3,13 @@
 from collections.abc import Callable
 from typing import TextIO
 
+Progress = Callable[[int, int], None]
+"""Called with the work done and all work, in any unit."""
+
 _WIPE = "\r\x1b[K"
 
 
-def progress_line(label: str, stream: TextIO) -> Callable[[int, int], None] | None:
+def progress_line(label: str, stream: TextIO) -> Progress | None:
     """Return what to call with the work done and all work, or None where `stream` is no terminal."""
     if not stream.isatty():
         return None

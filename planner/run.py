@@ -1,7 +1,6 @@
 """A plan file carried out and verified, from the check before the first byte to the files that tell of it."""
 
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
@@ -10,6 +9,7 @@ from planner.execute import Settings, bring_to, execute
 from planner.free_way import check_ends, nearest_turns, turns_to_start
 from planner.inside_view import ControlView, InsideView, view_of
 from planner.map_file import MAP_FILE
+from planner.progress import Progress
 from planner.robot_motion import robot_motion
 from planner.run_file import RunConditions, StoredRun, copy_input, save_robot, save_run
 from planner.run_input import RunInput, load_run_input
@@ -60,7 +60,7 @@ def run_plan(
     out: Path,
     options: RunOptions,
     map_file: Path | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Finished:
     """Carry a plan out on the table at a port, write what happened to `out`, and return what it came to.
 

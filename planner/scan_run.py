@@ -35,6 +35,7 @@ from planner.point_cloud import PlyWriter, XyzWriter
 from planner.probe import LaserProbe, measure
 from planner.probe_calibration import ProbeCalibration
 from planner.problem import Problem
+from planner.progress import Progress
 from planner.ray_casting import RayCaster
 from planner.reference_sphere import calibrate_cell
 from planner.scan import Scan
@@ -48,8 +49,8 @@ _BLOCK = 64
 # Profiles that are nearer to one another leave no gap.
 COVERED_MM = 2.0
 
-Progress = Callable[[str], Callable[[int, int], None] | None]
-"""Gives what to call with the work done and all work, for a kind of work."""
+ProgressOf = Callable[[str], Progress | None]
+"""Gives the progress of a kind of work."""
 
 
 class ScanError(PlannerError):
@@ -139,7 +140,7 @@ def with_mesh(scan: Scan, file: Path) -> Scan:
     return Scan(scan.name, scan.cell, scan.bodies, None, mesh, file, scan.path, scan.value, scan.limits, scan.weights)
 
 
-def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: Progress) -> Planned:
+def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: ProgressOf) -> Planned:
     """Return the best motion for a scan.
 
     Raises:
@@ -161,7 +162,7 @@ def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: Progre
     return Planned(plan, np.degrees(joints.joints), limits)
 
 
-def run_on_port(planned: Planned, options: ScanOptions, progress: Progress) -> LatchedRun:
+def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) -> LatchedRun:
     """Return what was latched while the table at the port made the motion.
 
     Raises:
@@ -194,7 +195,7 @@ def _trigger_line(port: object, table: TableClient, options: ScanOptions, open_t
     return ProbeByHand(view, table.clock)
 
 
-def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: Progress) -> Scanned:
+def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: ProgressOf) -> Scanned:
     """Carry a scan out, write its cloud to `out`, and return what it came to.
 
     Whatever interrupts it, what was scanned until then is written.
@@ -240,7 +241,7 @@ class _Measuring:
         self.coverage = Coverage(mesh, caster, probe, COVERED_MM)
         self._caster, self._probe, self._chain, self._seed = caster, probe, chain, options.seed
 
-    def go(self, ply: PlyWriter, xyz: XyzWriter | None, progress: Callable[[int, int], None] | None) -> bool:
+    def go(self, ply: PlyWriter, xyz: XyzWriter | None, progress: Progress | None) -> bool:
         """Measure, align and write all profiles; return False when Ctrl-C came before the last."""
         total = len(self._chain.run.numbers)
         true_T_WS, known_T_WS = self._chain.poses(()), self._known_poses()

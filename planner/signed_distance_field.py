@@ -6,7 +6,6 @@ field is built once and kept on disk under the mesh's content and the resolution
 
 import hashlib
 import zipfile
-from collections.abc import Callable
 from contextlib import suppress
 from math import floor, hypot, sqrt
 from pathlib import Path
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from planner.arrays import FloatArray
 from planner.bounding_volume_hierarchy import bounding_volume_hierarchy, nearest_triangle
 from planner.kernel import cache_directory, kernel
+from planner.progress import Progress
 from planner.whole_file import whole_file
 from planner.winding_number import BESIDE, winding_numbers
 
@@ -45,9 +45,7 @@ NO_FIELD = SignedDistanceField(np.zeros((2, 2, 2), np.float32), np.zeros(3), 1.0
 """What a kernel is handed where no part is a mesh."""
 
 
-def build_field(
-    mesh: trimesh.Trimesh, spacing_mm: float, progress: Callable[[int, int], None] | None = None
-) -> SignedDistanceField:
+def build_field(mesh: trimesh.Trimesh, spacing_mm: float, progress: Progress | None = None) -> SignedDistanceField:
     """Return the signed distance field of a watertight mesh; the grid reaches a cell beyond it on each side.
 
     The values are exact to the rounding of float32, but for points outside within a thousandth of the spacing of the
@@ -103,7 +101,7 @@ def _write_distances(
 def cached_field(
     mesh: trimesh.Trimesh,
     spacing_mm: float,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     folder: Path | None = None,
 ) -> SignedDistanceField:
     """Return the field of `mesh`, read from `folder` if it was built before (default: the user's cache)."""

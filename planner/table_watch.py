@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.inside_view import InsideView
+from planner.progress import Progress
 from planner.run_record import Observation, Record
 from planner.table_motion import TableMotion
 from planner.wire import Wire
@@ -40,7 +41,7 @@ class TableWatch:
         poll_s: float,
         look_s: float,
         view: InsideView | None = None,
-        progress: Callable[[int, int], None] | None = None,
+        progress: Progress | None = None,
     ) -> None:
         """Watch a motion.
 
