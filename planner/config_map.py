@@ -162,6 +162,12 @@ class ConfigurationMap:
         """Return the paper's `inrange`: whether f_R > epsilon at this point of the map."""
         return self.value(location, angle_deg) > self.epsilon
 
+    def forbidden_distance_deg(self, location: int, angle_deg: float) -> float:
+        """Return the way along the angle axis to the nearest forbidden sample of a location; infinite without any."""
+        forbidden_deg = self.angles_deg[~self.allowed[location]]
+        ways_deg = np.abs((forbidden_deg - angle_deg + 180.0) % 360.0 - 180.0)
+        return float(ways_deg.min(initial=np.inf))
+
 
 def _check_values(values: FloatArray) -> None:
     if values.ndim != 2 or values.shape[0] < 1 or values.shape[1] < 2:

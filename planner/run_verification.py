@@ -206,13 +206,9 @@ def _forbidden_steps(run_input: RunInput, motion: TableMotion, series: Sequence[
 
 def _margin_deg(configuration_map: ConfigurationMap, located_deg: FloatArray) -> float:
     """Return the least way to a forbidden cell, which begins one sample before the forbidden sample."""
-    margin = np.inf
-    for location, angle_deg in enumerate(located_deg):
-        forbidden_deg = configuration_map.angles_deg[~configuration_map.allowed[location]]
-        if len(forbidden_deg) and np.isfinite(angle_deg):
-            ways = np.abs((forbidden_deg - angle_deg + 180.0) % 360.0 - 180.0)
-            margin = min(margin, float(ways.min()) - configuration_map.angle_step_deg)
-    return margin
+    known = [(location, float(angle_deg)) for location, angle_deg in enumerate(located_deg) if np.isfinite(angle_deg)]
+    ways_deg = (configuration_map.forbidden_distance_deg(*place) for place in known)
+    return min(ways_deg, default=np.inf) - configuration_map.angle_step_deg
 
 
 def _executed_cost(run_input: RunInput, motion: TableMotion, located_deg: FloatArray) -> PathCost:

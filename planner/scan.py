@@ -6,7 +6,7 @@ looked for beside it.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -88,9 +88,21 @@ def load_scan(scan: str | Path) -> Scan:
     return Scan(file.stem, cell, bodies, workpiece, mesh, mesh_file, path, value, limits, weights)
 
 
+def with_mesh(scan: Scan, file: Path) -> Scan:
+    """Return the scan with the workpiece of another file in the place of its own.
+
+    Raises:
+        WorkpieceError: The mesh cannot be a workpiece, or does not fit the table.
+    """
+    mesh = load_mesh(file)
+    with _named(file):
+        _check_it_fits_the_table(mesh, scan.cell)
+    return replace(scan, workpiece=None, mesh=mesh, mesh_file=file)
+
+
 @contextmanager
 def _named(file: Path) -> Iterator[None]:
-    """Put the scan file's name before messages that do not know it."""
+    """Put the file's name before messages that do not know it."""
     try:
         yield
     except ScanFileError:

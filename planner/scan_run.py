@@ -22,12 +22,11 @@ from planner.cell import Cell, placement
 from planner.configuration import Configuration
 from planner.coverage import Coverage
 from planner.error_account import Account, Chain, Samples, account
-from planner.errors import PlannerError, WorkpieceError
+from planner.errors import PlannerError
 from planner.inside_view import ControlView
 from planner.latched_run import LatchedRun, TriggerConditions, run_latched
 from planner.map_builder import build_maps
 from planner.map_problem import map_problem
-from planner.mesh import load_mesh, radius_about_axis_mm
 from planner.motion import Limits
 from planner.plan import Plan
 from planner.planners import DEFAULT_PLANNER, PLANNERS
@@ -122,22 +121,6 @@ class Scanned:
     def is_whole(self) -> bool:
         """Whether the motion and the measuring came to their ends."""
         return self.run.failure is None and not self.is_interrupted
-
-
-def with_mesh(scan: Scan, file: Path) -> Scan:
-    """Return the scan with the workpiece of another file in the place of its own.
-
-    Raises:
-        WorkpieceError: The mesh cannot be a workpiece, or does not fit the table.
-    """
-    mesh = load_mesh(file)
-    reach_mm = radius_about_axis_mm(mesh, scan.cell.T_TW)
-    if reach_mm > scan.cell.table.radius_mm:
-        raise WorkpieceError(
-            f"{file}: the workpiece reaches {reach_mm:.1f} mm from the table's axis; it must stay within the table's"
-            f" radius of {scan.cell.table.radius_mm:g} mm"
-        )
-    return Scan(scan.name, scan.cell, scan.bodies, None, mesh, file, scan.path, scan.value, scan.limits, scan.weights)
 
 
 def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: ProgressOf) -> Planned:

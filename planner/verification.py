@@ -45,7 +45,9 @@ def verify(problem: Problem, plan: Plan) -> Verification:
     limits = problem.limits
     return Verification(
         forbidden_steps=_forbidden_steps(problem, plan),
-        clearance_deg=min(_clearance_deg(problem, k, float(angle)) for k, angle in enumerate(plan.angles_deg)),
+        clearance_deg=min(
+            problem.map.forbidden_distance_deg(k, float(angle_deg)) for k, angle_deg in enumerate(plan.angles_deg)
+        ),
         speed_margin_deg_s=limits.speed_deg_s - float(np.abs(plan.speeds_deg_s).max()),
         acceleration_margin_deg_s2=limits.acceleration_deg_s2 - float(np.abs(plan.accelerations_deg_s2).max()),
     )
@@ -63,10 +65,3 @@ def _forbidden_steps(problem: Problem, plan: Plan) -> tuple[int, ...]:
         if not is_allowed:
             forbidden.append(k)
     return tuple(forbidden)
-
-
-def _clearance_deg(problem: Problem, location: int, angle_deg: float) -> float:
-    forbidden_deg = problem.map.angles_deg[~problem.map.allowed[location]]
-    if len(forbidden_deg) == 0:
-        return np.inf
-    return float(np.abs((forbidden_deg - angle_deg + 180.0) % 360.0 - 180.0).min())

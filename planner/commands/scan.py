@@ -8,10 +8,10 @@ from planner.commands import options
 from planner.errors import PlannerError
 from planner.latched_run import TriggerConditions
 from planner.progress import progress_line
-from planner.scan import load_scan
+from planner.scan import load_scan, with_mesh
 from planner.scan_file import save_scan, scan_document
 from planner.scan_report import scan_report, verdict_of
-from planner.scan_run import Scanned, ScanOptions, scan_workpiece, with_mesh
+from planner.scan_run import Scanned, ScanOptions, scan_workpiece
 from planner.whole_file import write_whole
 from protocol import TableError
 

@@ -113,3 +113,12 @@ def test_an_epsilon_that_forbids_all_or_nothing_is_refused(epsilon: float) -> No
 def test_a_point_off_the_map_is_refused(location: float) -> None:
     with pytest.raises(ConfigurationMapError, match="off the map"):
         random_map(1).value(location, 0.0)
+
+
+def test_the_way_to_the_nearest_forbidden_sample_goes_round_either_side() -> None:
+    values = np.ones((2, 360))
+    values[0, [10, 350]] = 0.0
+    configuration_map = ConfigurationMap(values)
+    for angle_deg, way_deg in ((0.0, 10.0), (5.5, 4.5), (-7.0, 3.0), (180.0, 170.0), (720.0 + 349.0, 1.0)):
+        assert configuration_map.forbidden_distance_deg(0, angle_deg) == pytest.approx(way_deg)
+    assert configuration_map.forbidden_distance_deg(1, 0.0) == math.inf

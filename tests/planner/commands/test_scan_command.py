@@ -143,6 +143,7 @@ def inside_out() -> trimesh.Trimesh:
         (inside_out(), "inside out"),
         (trimesh.creation.box((0.05, 0.05, 0.05)), "is it in metres?"),
         (trimesh.creation.box((600.0, 50.0, 50.0)), "must stay within the table's radius of 250 mm"),
+        (trimesh.creation.box((50.0, 50.0, 50.0)), "25.0 mm below the table's top"),
     ],
 )
 def test_a_mesh_that_cannot_be_meant_is_one_line_and_status_2(
