@@ -56,6 +56,11 @@ class Settings(NamedTuple):
     poll_s: float = 0.05
     look_s: float = 0.02
 
+    @property
+    def encoder_delay_s(self) -> float:
+        """How long after its time in the plan the encoder is at an angle."""
+        return self.lag_s - self.lead_s
+
 
 def execute(
     table: TableClient,
@@ -84,7 +89,7 @@ def execute(
     """
     settings = settings or Settings()
     commands = CorrectedStream(
-        motion, limits, wire, settings.drift_deg, settings.drift_filter_s, settings.lag_s - settings.lead_s
+        motion, limits, wire, settings.drift_deg, settings.drift_filter_s, settings.encoder_delay_s
     )
     # The first command's S and A are to be sent in peace.
     preparation_s = 4.0 * exchanges_s(wire, _ANY_COMMAND)

@@ -13,7 +13,7 @@ import numpy as np
 from planner.arrays import FloatArray, IndexArray
 from planner.errors import PlannerError
 from planner.execute import Settings, bring_to, execute
-from planner.latching import Drop, RobotLatch, TableReading, Tolerances, Trigger, pair
+from planner.latching import Drop, Pairing, RobotLatch, TableReading, Tolerances, Trigger, pair
 from planner.motion import Limits
 from planner.plan import Plan
 from planner.progress import Progress
@@ -144,40 +144,49 @@ def run_latched(
     record = execute(table, motion, limits, wire, settings, line, progress)
     line.stop()
     times_s = line.times_s() - record.origin_s
-
-    robot = robot_motion(motion, joints_deg)
-    latch_times_s = robot_latch_times_s(times_s, conditions.delay_s, conditions.faults, conditions.seed)
     triggers = [Trigger(k, time_s) for k, time_s in enumerate(times_s.tolist()) if motion.is_scanning(time_s)]
+    robot = robot_motion(motion, joints_deg)
+    latches = _robot_latches(robot, times_s, conditions)
     readings = list(_readings(record, wire))
-    lag_s = settings.lag_s - settings.lead_s
+    # Half a step of the wire may be rounded off.
+    tolerances = Tolerances(table_deg=_TRACKING_DEG + 0.5 * wire.quantum)
     pairing = pair(
-        triggers,
-        [RobotLatch(at, joints) for at, joints in zip(latch_times_s, _joints_at(robot, latch_times_s), strict=True)],
-        readings,
-        lambda time_s: motion.state_at(time_s - lag_s).angle_deg,
-        Tolerances(table_deg=_TRACKING_DEG + 0.5 * wire.quantum),
+        triggers, latches, readings, lambda at_s: motion.state_at(at_s - settings.encoder_delay_s).angle_deg, tolerances
     )
-    numbers = pairing.numbers
-    if not len(numbers):
+    if not len(pairing.numbers):
         raise NothingScannedError(_why_nothing(triggers, pairing.dropped, record.failure))
-    truth = line.truth()
-    exposure, edge, latched = (pairing.angles_deg,) * 3 if truth is None else (part[numbers] for part in truth)
-    # The table may have missed a trigger in such slow motion that nobody could tell.
-    edge, latched = np.where(np.isnan(latched), (exposure, pairing.angles_deg), (edge, latched))
+    true_deg, edge_deg, latched_deg, tells_truth = _truth(line, pairing)
     return LatchedRun(
-        numbers,
-        times_s[numbers],
-        pairing.joints_deg,
-        pairing.angles_deg,
-        _joints_at(robot, times_s[numbers]),
-        exposure,
-        edge,
-        latched,
-        truth is not None,
-        len(triggers),
-        pairing.dropped,
-        record.failure,
+        numbers=pairing.numbers,
+        times_s=times_s[pairing.numbers],
+        joints_deg=pairing.joints_deg,
+        angles_deg=pairing.angles_deg,
+        true_joints_deg=_joints_at(robot, times_s[pairing.numbers]),
+        true_deg=true_deg,
+        edge_deg=edge_deg,
+        latched_deg=latched_deg,
+        tells_truth=tells_truth,
+        triggers=len(triggers),
+        dropped=pairing.dropped,
+        failure=record.failure,
     )
+
+
+def _robot_latches(robot: RobotMotion, times_s: FloatArray, conditions: TriggerConditions) -> list[RobotLatch]:
+    """Return what an ideal robot latches on the triggers that arrive there."""
+    at_s = robot_latch_times_s(times_s, conditions.delay_s, conditions.faults, conditions.seed)
+    return [RobotLatch(time_s, joints) for time_s, joints in zip(at_s, _joints_at(robot, at_s), strict=True)]
+
+
+def _truth(line: TriggerLine, pairing: Pairing) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
+    """Return the table's angle at the exposures and at the edges, the encoder there, and whether the port told them."""
+    truth = line.truth()
+    if truth is None:
+        return pairing.angles_deg, pairing.angles_deg, pairing.angles_deg, False
+    true_deg, edge_deg, latched_deg = (part[pairing.numbers] for part in truth)
+    # The table may have missed a trigger in such slow motion that nobody could tell.
+    edge_deg, latched_deg = np.where(np.isnan(latched_deg), (true_deg, pairing.angles_deg), (edge_deg, latched_deg))
+    return true_deg, edge_deg, latched_deg, True
 
 
 def _readings(record: Record, wire: Wire) -> Iterator[TableReading]:
