@@ -14,11 +14,12 @@ from hypothesis.errors import HypothesisException
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule, run_state_machine_as_test
 
 from protocol.conformance.ports import is_simulated, open_port
-from protocol.conformance.rig import Rig, number, require
+from protocol.conformance.rig import Rig
 from protocol.conformance.stand import TRIGGER, stand_beside
 from protocol.conformance.suite import SessionError
-from protocol.conformance.verdict import NonconformityError
+from protocol.conformance.verdict import NonconformityError, require
 from protocol.conformance.wire import RecordedPort, Wire
+from protocol.conformance.wire_checks import number
 from protocol.messages import ErrorCode
 
 _ON_A_PORT, _SIMULATED = (4, 12), (12, 20)

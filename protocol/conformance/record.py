@@ -10,7 +10,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from protocol.conformance.profile import Profile, ProfileError, profile_from
-from protocol.conformance.rig import Expectation, MotionRecord, Sample
+from protocol.conformance.reference import Expectation, MotionRecord, Sample
 from protocol.conformance.suite import Outcome
 from protocol.conformance.verdict import Measurement, Verdict
 from protocol.conformance.wire import Event

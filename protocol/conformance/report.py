@@ -10,7 +10,7 @@ from string import Template
 
 from protocol.conformance.case import Case
 from protocol.conformance.record import Header, count_verdicts, versions, write_whole
-from protocol.conformance.rig import MotionRecord
+from protocol.conformance.reference import MotionRecord
 from protocol.conformance.suite import Outcome
 from protocol.conformance.svg_plot import Panel, plot, range_bar
 from protocol.conformance.verdict import Measurement, Verdict

@@ -11,7 +11,8 @@ from random import Random
 from protocol.conformance.case import Case
 from protocol.conformance.host_watch import Punctual, Watch
 from protocol.conformance.profile import Profile
-from protocol.conformance.rig import MotionRecord, Rig
+from protocol.conformance.reference import MotionRecord
+from protocol.conformance.rig import Rig
 from protocol.conformance.stand import POWER_CYCLE, PRESET, RecordedStand, Stand, StandError, capabilities
 from protocol.conformance.verdict import Measurement, NonconformityError, Verdict
 from protocol.conformance.wire import Event, RecordedPort, Wire

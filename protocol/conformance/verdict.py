@@ -22,6 +22,12 @@ class NonconformityError(Exception):
     """The table did not do what the clause says; the message says what it did instead."""
 
 
+def require(condition: bool, otherwise: str) -> None:
+    """Raise NonconformityError unless the condition holds."""
+    if not condition:
+        raise NonconformityError(otherwise)
+
+
 @dataclass(frozen=True)
 class Measurement:
     """A measured quantity and the closed range that it must lie in; an end that is None is open."""

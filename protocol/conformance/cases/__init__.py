@@ -1,15 +1,31 @@
 """The cases, by chapter of the specification; importing this package registers them."""
 
 from protocol.conformance.cases import (
-    commands,
+    grammar,
     lines,
     motion,
     preemption,
+    readings,
     recovery,
     registers,
     replies,
     serial_line,
+    settings,
     stateful,
+    targets,
 )
 
-__all__ = ["commands", "lines", "motion", "preemption", "recovery", "registers", "replies", "serial_line", "stateful"]
+__all__ = [
+    "grammar",
+    "lines",
+    "motion",
+    "preemption",
+    "readings",
+    "recovery",
+    "registers",
+    "replies",
+    "serial_line",
+    "settings",
+    "stateful",
+    "targets",
+]

@@ -1,8 +1,9 @@
 """Chapter 3: from bytes to lines."""
 
 from protocol.conformance.case import case
-from protocol.conformance.rig import Rig, require
+from protocol.conformance.rig import Rig
 from protocol.conformance.stand import DISCONNECT, ERROR_REPLIES
+from protocol.conformance.verdict import require
 from protocol.messages import LINE_LIMIT, ErrorCode
 
 

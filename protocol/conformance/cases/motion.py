@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from math import sqrt
 
 from protocol.conformance.case import case
-from protocol.conformance.rig import Expectation, Rig, Sample, require
-from protocol.conformance.verdict import NonconformityError
+from protocol.conformance.reference import Expectation, Sample
+from protocol.conformance.rig import Rig
+from protocol.conformance.verdict import NonconformityError, require
 
 
 @case("7.1/1", travel_deg=30)

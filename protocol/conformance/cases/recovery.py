@@ -2,8 +2,9 @@
 
 from protocol.client import TableClient
 from protocol.conformance.case import case
-from protocol.conformance.rig import Rig, require
+from protocol.conformance.rig import Rig
 from protocol.conformance.stand import ERROR_REPLIES
+from protocol.conformance.verdict import require
 from protocol.messages import ErrorCode
 
 

@@ -1,8 +1,9 @@
 """Chapter 6: the registers and the latch."""
 
 from protocol.conformance.case import case
-from protocol.conformance.rig import Rig, require
+from protocol.conformance.rig import Rig
 from protocol.conformance.stand import POWER_CYCLE, PRESET, TRIGGER
+from protocol.conformance.verdict import require
 
 
 @case("6.1/1", TRIGGER, travel_deg=10)

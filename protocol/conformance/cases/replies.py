@@ -3,9 +3,9 @@
 from decimal import ROUND_HALF_EVEN, Decimal
 
 from protocol.conformance.case import case
-from protocol.conformance.rig import Rig, require
+from protocol.conformance.rig import Rig
 from protocol.conformance.stand import ERROR_REPLIES, PRESET, STRICT
-from protocol.conformance.verdict import NonconformityError
+from protocol.conformance.verdict import NonconformityError, require
 from protocol.messages import ErrorCode
 
 _MIXED = (b"H", b"L", b"S 10", b"A 20", b"H", b"R 0", b"L", b"H", b"S 0", b"?")

@@ -1,8 +1,10 @@
 """Chapter 2: the serial line."""
 
 from protocol.conformance.case import case
-from protocol.conformance.rig import QUIET_S, Rig, require
+from protocol.conformance.rig import Rig
 from protocol.conformance.stand import ERROR_REPLIES, PACING
+from protocol.conformance.verdict import require
+from protocol.conformance.wire_checks import QUIET_S
 from protocol.messages import ErrorCode
 
 _TRAIN = 8

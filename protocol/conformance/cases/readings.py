@@ -1,0 +1,70 @@
+"""Chapters 4.2 and 4.3: `H` and `L` read the position and the latch."""
+
+from protocol.conformance.case import case
+from protocol.conformance.rig import Rig
+from protocol.conformance.stand import TRIGGER
+from protocol.conformance.verdict import require
+
+
+@case("4.2/1", travel_deg=10)
+def h_reads_the_position(rig: Rig) -> None:
+    """Move, and read where the table is."""
+    rig.move_to(10)
+    rig.finish()
+
+
+@case("4.2/2", travel_deg=40)
+def a_position_is_of_the_time_of_its_reply(rig: Rig) -> None:
+    """At constant speed, fit a line through the positions and the times at which they can have been true."""
+    speed = rig.profile.motion.speed_deg_s / 2
+    rig.settings(speed, rig.profile.motion.acceleration_deg_s2)
+    rig.move_to(40)
+    begin_s = speed / rig.rate_deg_s2 + 0.1
+    rig.follow(begin_s)
+    rig.follow(rig.motion.expectations[-1].motion.duration_s - 2 * begin_s)
+    # A register that is read only now and then gives the same position twice, then a jump.
+    steps = zip(rig.motion.samples, rig.motion.samples[1:], strict=False)
+    cruising = [(one, two) for one, two in steps if begin_s < one.time_s - rig.motion.expectations[-1].began_s]
+    worst_deg = max(
+        abs(two.position_deg - one.position_deg - speed * (two.time_s - one.time_s))
+        - speed * (one.uncertainty_s + two.uncertainty_s)
+        for one, two in cruising
+    )
+    allowed_deg = rig.profile.resolution_deg + 0.1 * speed * 0.1
+    rig.measure("step of the position, beyond its time", max(worst_deg, 0.0), "deg", most=allowed_deg)
+    rig.finish()
+
+
+@case("4.2/3", travel_deg=370)
+def the_position_is_unwrapped(rig: Rig) -> None:
+    """Turn by one turn and 10 degrees."""
+    rig.settings(rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2)
+    rig.move_to(370)
+    rig.finish()
+
+
+@case("4.2/4")
+def reading_changes_nothing(rig: Rig) -> None:
+    """Read ten times."""
+    first = rig.read()
+    for _ in range(10):
+        require(rig.read() == first, "the position changed while it was only read")
+
+
+@case("4.3/1")
+def l_reads_the_latch(rig: Rig) -> None:
+    """Read the latch."""
+    rig.read(b"L")
+
+
+@case("4.3/2", TRIGGER, travel_deg=10)
+def reading_keeps_the_latch(rig: Rig) -> None:
+    """Latch a position, move on, and read the latch twice."""
+    rig.move_to(10)
+    rig.finish()
+    rig.stand.trigger()
+    rig.move_to(0)
+    rig.finish()
+    latched = [rig.read(b"L") for _ in range(3)]
+    require(len(set(latched)) == 1, f"the latch was read as {latched}")
+    rig.measure("latch", float(latched[0]) - rig.home_deg, "deg", *rig.near(10))
