@@ -45,10 +45,11 @@ PROTOCOL_EDGE = {
     "protocol/conformance/host_watch.py": {"os", "select", "threading", "time"},
     "protocol/conformance/ports.py": {"pathlib", "serial"},
     "protocol/conformance/profile.py": {"pathlib"},
+    "protocol/conformance/program.py": {"os", "signal", "subprocess"},
     "protocol/conformance/pytest_plugin.py": {"pathlib"},
     "protocol/conformance/record.py": {"pathlib"},
     "protocol/conformance/report.py": {"pathlib"},
-    "protocol/conformance/stand.py": {"pathlib", "socket", "subprocess"},
+    "protocol/conformance/stand.py": {"pathlib", "socket"},
 }
 
 EMULATOR_EDGE = {

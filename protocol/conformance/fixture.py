@@ -15,7 +15,7 @@ import pytest
 from protocol.client import TableClient
 from protocol.conformance.ports import open_port
 from protocol.conformance.profile import Profile, load_profile
-from protocol.conformance.stand import Stand, StandError, stand_beside
+from protocol.conformance.stand import POWER_CYCLE, TRIGGER, Stand, StandError, stand_beside
 from protocol.conformance.suite import SessionError
 from protocol.conformance.wire import ReopenablePort
 from protocol.errors import TableError
@@ -54,11 +54,11 @@ class RotaryTable:
 
     def trigger(self) -> None:
         """Put one edge on the trigger input; a test is skipped where the rig cannot."""
-        self._do(self._stand.trigger)
+        self._do(TRIGGER, lambda stand: stand.trigger())
 
     def power_cycle(self) -> None:
         """Switch the table off and on; a test is skipped where the rig cannot."""
-        self._do(self._stand.power_cycle)
+        self._do(POWER_CYCLE, lambda stand: stand.power_cycle())
 
     def __enter__(self) -> Self:
         return self
@@ -81,12 +81,13 @@ class RotaryTable:
         # A pty has one client, so that what stands beside it does not open it.
         return stand_beside(self.port, self._control, self.profile)
 
-    @staticmethod
-    def _do(deed: Callable[[], None]) -> None:
+    def _do(self, capability: str, deed: Callable[[Stand], None]) -> None:
         try:
-            deed()
+            if capability not in self._stand.capabilities:
+                pytest.skip(f"lacks {capability}")
+            deed(self._stand)
         except StandError as error:
-            pytest.skip(str(error))
+            pytest.fail(str(error))
 
 
 @contextmanager

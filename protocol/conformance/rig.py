@@ -1,13 +1,14 @@
 """What a case holds in its hands: the table's wire, its motion beside the motion that it should make, and a pencil."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from decimal import Decimal
 from random import Random
 
 from protocol.conformance.profile import Profile
 from protocol.conformance.reference import Instant, MotionRecord, Reference, Sample
-from protocol.conformance.stand import Stand
-from protocol.conformance.verdict import Measurement, require
+from protocol.conformance.stand import Stand, StandError
+from protocol.conformance.verdict import Measurement, NonconformityError, require
 from protocol.conformance.wire import CR, Line, Wire
 from protocol.conformance.wire_checks import WireChecks, number
 
@@ -81,6 +82,17 @@ class Rig(WireChecks):
     def stand_at(self, angle_deg: float) -> None:
         """Take it that the reference rests at an angle."""
         self._reference.stand_at(self.wire.clock.now_s(), angle_deg)
+
+    def power_cycle(self) -> None:
+        """Switch the table off and on while it rests: home stays the same place, whatever the table calls it then."""
+        before = self.read()
+        try:
+            self.stand.power_cycle()
+        except StandError:
+            with suppress(NonconformityError):  # what the switch did not do is the news
+                self.home_deg += round(self.read() - before)
+            raise
+        self.home_deg += round(self.read() - before)
 
     def move_to(self, angle_deg: float) -> None:
         """Command P, relative to home."""

@@ -5,14 +5,16 @@ control channel of a stand-in, programs that the profile names, or nobody.
 """
 
 import json
+import shlex
 import socket
-import subprocess
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from shutil import which
 from typing import Any, Protocol
 
 from protocol.conformance.profile import Profile
+from protocol.conformance.program import failure_of
 from protocol.port import Port
 
 TRIGGER = "a trigger input that the rig can drive"
@@ -25,6 +27,9 @@ PACING = "a paced line"
 RANDOM_SEARCH = "the library hypothesis"
 
 _TIMEOUT_S = 5.0
+_PROGRAM_S = 60.0
+_TRIGGER_KEY = "rig.trigger_command"
+_POWER_CYCLE_KEY = "rig.power_cycle_command"
 
 
 class StandError(Exception):
@@ -125,28 +130,41 @@ class ControlChannel:
 
 
 class Programs(WireOnly):
-    """Programs of the test bench that the profile names."""
+    """Programs of the test bench that the profile names; each has done its deed when it ends with status 0.
 
-    def __init__(self, trigger_command: Sequence[str], power_cycle_command: Sequence[str]) -> None:
+    Raises:
+        StandError: there is no such program here.
+    """
+
+    def __init__(
+        self,
+        trigger_command: Sequence[str],
+        power_cycle_command: Sequence[str],
+        timeout_s: float = _PROGRAM_S,
+    ) -> None:
         self._trigger_command = trigger_command
         self._power_cycle_command = power_cycle_command
+        self._timeout_s = timeout_s
         named = {TRIGGER: trigger_command, POWER_CYCLE: power_cycle_command}
         self.capabilities = frozenset(capability for capability, command in named.items() if command)
+        for key, command in ((_TRIGGER_KEY, trigger_command), (_POWER_CYCLE_KEY, power_cycle_command)):
+            if command and which(command[0]) is None:
+                raise StandError(f"{key}: there is no program {command[0]!r} here; give its path, or leave the key out")
 
     def trigger(self) -> None:
         """Run the trigger's program."""
-        self._run(self._trigger_command)
+        self._run(_TRIGGER_KEY, self._trigger_command)
 
     def power_cycle(self) -> None:
         """Run the power switch's program."""
-        self._run(self._power_cycle_command)
+        self._run(_POWER_CYCLE_KEY, self._power_cycle_command)
 
-    @staticmethod
-    def _run(command: Sequence[str]) -> None:
-        try:
-            subprocess.run(command, check=True, timeout=60.0, capture_output=True)  # noqa: S603  # the profile's own
-        except (OSError, subprocess.SubprocessError) as error:
-            raise StandError(f"{command[0]}: {error}") from error
+    def _run(self, key: str, command: Sequence[str]) -> None:
+        if not command:
+            raise StandError(f"the profile has no {key}")
+        failure = failure_of(command, self._timeout_s)
+        if failure:
+            raise StandError(f"the profile's {key}, `{shlex.join(command)}`, {failure}")
 
 
 class RecordedStand:
@@ -177,7 +195,7 @@ def stand_beside(port: Port, control: Path | None, profile: Profile) -> Stand:
     """Return what can be done to the table at a port.
 
     Raises:
-        StandError: the control channel does not answer.
+        StandError: the control channel does not answer, or a program that the profile names is not there.
     """
     if control is not None:
         return ControlChannel(control)

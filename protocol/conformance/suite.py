@@ -13,7 +13,7 @@ from protocol.conformance.host_watch import Punctual, Watch
 from protocol.conformance.profile import Profile
 from protocol.conformance.reference import MotionRecord
 from protocol.conformance.rig import Rig
-from protocol.conformance.stand import POWER_CYCLE, PRESET, RecordedStand, Stand, StandError, capabilities
+from protocol.conformance.stand import PRESET, RecordedStand, Stand, StandError, capabilities
 from protocol.conformance.verdict import Measurement, NonconformityError, Verdict
 from protocol.conformance.wire import Event, RecordedPort, Wire
 
@@ -76,10 +76,10 @@ class Session:
             for one in cases:
                 outcomes.append(self.run_case(one))
                 report(outcomes[-1])
+            self.end()
         except BaseException:
             self.stop()
             raise
-        self.end()
         return outcomes
 
     def run_case(self, case: Case) -> Outcome:
@@ -99,7 +99,7 @@ class Session:
             if len(spoiled) == _RUNS:
                 return replace(outcome, verdict=Verdict.ERROR, reason=spoiled.pop(), spoiled=tuple(spoiled))
             self._watch.wait_for_calm(allowed_s, _PATIENCE_S)
-            self._after_failure(case)
+            self._recover(case)
 
     def _run_once(self, case: Case) -> Outcome:
         first_event, begin_s = len(self._port.events), self._port.clock.now_s()
@@ -145,12 +145,15 @@ class Session:
             rig.silence("after its last reply the table")
             self._restore(case, rig)
         except NonconformityError as error:
-            self._after_failure(case)
+            self._after_failure(case, rig)
             return Verdict.FAIL, str(error)
-        except (OSError, StandError) as error:
+        except StandError as error:
+            self._after_failure(case, rig)
+            return Verdict.ERROR, str(error)
+        except OSError as error:
             return Verdict.ERROR, f"{type(error).__name__}: {error}"
         except Exception as error:  # a fault of the case itself ends that case alone
-            self._after_failure(case)
+            self._after_failure(case, rig)
             return Verdict.ERROR, "".join(traceback.format_exception_only(error)).strip()
         failed = [measurement for measurement in rig.measurements if measurement.verdict is Verdict.FAIL]
         marginal = [measurement for measurement in rig.measurements if measurement.verdict is Verdict.MARGINAL]
@@ -171,18 +174,22 @@ class Session:
         return ""
 
     def _restore(self, case: Case, rig: Rig) -> None:
-        """Leave the table at home for the next case; where a case moved the counter's zero, home is 0."""
-        if POWER_CYCLE in case.needs:
-            self.home_deg = 0
+        """Leave the table at home for the next case; where a case moved the counter's zero, home is another number."""
         if PRESET in case.needs:
             self._stand.power_cycle()  # the table stands where it stood
             self.home_deg = 0
-        elif case.travel_deg:
+            return
+        self.home_deg = rig.home_deg
+        if case.travel_deg:
             rig.go_home()
 
-    def _after_failure(self, case: Case) -> None:
+    def _after_failure(self, case: Case, rig: Rig) -> None:
+        self.home_deg = rig.home_deg
+        self._recover(case)
+
+    def _recover(self, case: Case) -> None:
         """Stop the table and empty the line, whatever is on it, and bring it home."""
-        if {PRESET, POWER_CYCLE} & case.needs:
+        if PRESET in case.needs:
             try:
                 self._stand.power_cycle()
             except StandError:

@@ -48,8 +48,7 @@ def a_speed_that_rounds_to_nothing_is_refused(rig: Rig) -> None:
 @case("4.6/5", POWER_CYCLE, travel_deg=20)
 def the_speed_at_power_on(rig: Rig) -> None:
     """Switch the table off and on, set A alone, and move."""
-    rig.stand.power_cycle()
-    rig.home_deg = 0
+    rig.power_cycle()
     rig.stand_at_home()
     rig.set_acceleration(rig.profile.motion.acceleration_deg_s2)
     rig.top_deg_s = rig.profile.power_on.speed_deg_s
@@ -96,8 +95,7 @@ def an_acceleration_that_rounds_to_nothing_is_refused(rig: Rig) -> None:
 @case("4.7/5", POWER_CYCLE, travel_deg=20)
 def the_acceleration_at_power_on(rig: Rig) -> None:
     """Switch the table off and on, set S alone, and move."""
-    rig.stand.power_cycle()
-    rig.home_deg = 0
+    rig.power_cycle()
     rig.stand_at_home()
     rig.set_speed(rig.profile.motion.speed_deg_s)
     rig.rate_deg_s2 = rig.profile.power_on.acceleration_deg_s2

@@ -420,6 +420,14 @@ class WakesSlow(WakesOtherwise):
     """at power-on the speed is another"""
 
 
+@caught_by("6.1/5")
+class KeepsItsCount(Mutant):
+    """the position outlives the power"""
+
+    def reset(self, count: int = 0) -> None:
+        super().reset(count or self._state.firmware.counts[-1])
+
+
 # Motion
 
 

@@ -91,6 +91,33 @@ def test_an_interrupted_session_stops_the_table() -> None:
     assert 20 < status.encoder_deg < 60  # where it was, and not at home
 
 
+class InterruptedOnItsWay(RecordedPort):
+    """Ctrl-C comes half a second after the table was sent home."""
+
+    def write(self, data: bytes, /) -> int | None:
+        written = super().write(data)
+        if data == b"P 0\r":
+            self.clock.sleep_s(0.5)
+            raise KeyboardInterrupt
+        return written
+
+
+def test_a_session_that_is_interrupted_on_its_way_home_stops_the_table() -> None:
+    port = port_to(Mutant)
+    session = Session(InterruptedOnItsWay(port), load_profile(), InProcess(port.table))
+
+    def elsewhere(rig: Rig) -> None:
+        rig.full_settings()
+        rig.expect(b"P 60")
+        rig.wait_for_rest()
+
+    with pytest.raises(KeyboardInterrupt):
+        session.run([dataclasses.replace(chosen_cases(["4.2/4"])[0], run=elsewhere)])
+    status = port.table.status()
+    assert status.state == "idle"
+    assert 40 < status.encoder_deg < 60  # on its way, where it was stopped
+
+
 def test_what_a_table_lacks_is_skipped_with_its_reason(tmp_path: Path) -> None:
     profile = profile_with(
         tmp_path, "[motion]\nreach_deg = 10\n[waive]\n'5.2/4' = 'its printf'\n[rig]\nsees_disconnect = false\n"
