@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import suppress
 from decimal import Decimal
+from math import ceil, sqrt
 from random import Random
 
 from protocol.conformance.profile import Profile
@@ -16,6 +17,8 @@ _POLL_S = 0.005
 _REST_READINGS = 5
 _REST_INTERVAL_S = 0.05
 _REST_TIMEOUT_S = 30.0
+_LEAST_SHARE = 0.1
+"""The least acceleration that a case sets, as a share of the profile's."""
 
 
 class Rig(WireChecks):
@@ -167,12 +170,19 @@ class Rig(WireChecks):
         readings: list[Decimal] = []
         allowed = self.profile.motion
         deadline_s = self.wire.clock.now_s() + _REST_TIMEOUT_S + 2 * allowed.reach_deg / allowed.speed_deg_s
-        while len(readings) < _REST_READINGS or len(set(readings[-_REST_READINGS:])) > 1:
+        wanted = self._readings_at_rest()
+        while len(readings) < wanted or len(set(readings[-wanted:])) > 1:
             require(self.wire.clock.now_s() < deadline_s, f"the table does not come to rest: {readings[-3:]}")
             if readings:
                 self.wire.clock.sleep_s(_REST_INTERVAL_S)
             readings.append(self.read())
         return readings[-1]
+
+    def _readings_at_rest(self) -> int:
+        """Return how many equal readings show a rest: where a slow motion begins or turns back there are several."""
+        rate_deg_s2 = self.rate_deg_s2 or _LEAST_SHARE * self.profile.motion.acceleration_deg_s2
+        turning_s = 2 * sqrt(2 * self.profile.resolution_deg / rate_deg_s2)
+        return max(_REST_READINGS, 2 + ceil(turning_s / _REST_INTERVAL_S))
 
     def _move(self, command: bytes, target_from: Callable[[float], float]) -> None:
         """Carry out a motion command, and follow what can come of it."""
@@ -192,3 +202,8 @@ class Rig(WireChecks):
     def _jitter_s(self) -> float:
         """How far a measured time may be off: that of a simulated clock is exact to a tick."""
         return self.profile.serial.latency_s / 4
+
+
+def cruising_speed(distance_deg: float, rate_deg_s2: float) -> float:
+    """Return the greatest speed that a motion from rest to rest keeps for a third of its way."""
+    return sqrt(rate_deg_s2 * distance_deg * 2 / 3)

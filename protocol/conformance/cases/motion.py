@@ -5,21 +5,26 @@ from math import sqrt
 
 from protocol.conformance.case import case
 from protocol.conformance.reference import Expectation, Sample
-from protocol.conformance.rig import Rig
+from protocol.conformance.rig import Rig, cruising_speed
 from protocol.conformance.verdict import NonconformityError, require
+
+_RAMP_DEG = 5.0
+"""From readings of a tenth of a degree, an acceleration can be told over such a way."""
 
 
 @case("7.1/1", travel_deg=30)
 def a_long_motion_is_a_trapezoid(rig: Rig) -> None:
     """Measure top speed, acceleration and deceleration of a motion long enough to reach S."""
-    _travel(rig, 30, rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 4)
+    allowed = rig.profile.motion
+    _travel(rig, 30, *_readable(30, allowed.speed_deg_s / 2, allowed.acceleration_deg_s2 / 4))
     _measure_trapezoid(rig)
 
 
 @case("7.1/1:backwards", travel_deg=30)
 def a_long_motion_backwards_is_a_trapezoid(rig: Rig) -> None:
     """The same backwards, with other S and A."""
-    _travel(rig, -30, rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2)
+    allowed = rig.profile.motion
+    _travel(rig, -30, *_readable(30, allowed.speed_deg_s, allowed.acceleration_deg_s2))
     _measure_trapezoid(rig)
 
 
@@ -122,6 +127,12 @@ def _travel(rig: Rig, distance_deg: float, top_deg_s: float, rate_deg_s2: float)
     rig.settings(top_deg_s, rate_deg_s2)
     rig.move_to(distance_deg)
     rig.finish()
+
+
+def _readable(distance_deg: float, top_deg_s: float, rate_deg_s2: float) -> tuple[float, float]:
+    """Return S and A, lowered until both ramps are long enough to be read and leave a third of the way between them."""
+    rate_deg_s2 = min(rate_deg_s2, top_deg_s**2 / (2 * _RAMP_DEG))
+    return min(top_deg_s, cruising_speed(distance_deg, rate_deg_s2)), rate_deg_s2
 
 
 def _measure_trapezoid(rig: Rig) -> None:

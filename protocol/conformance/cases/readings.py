@@ -1,7 +1,7 @@
 """Chapters 4.2 and 4.3: `H` and `L` read the position and the latch."""
 
 from protocol.conformance.case import case
-from protocol.conformance.rig import Rig
+from protocol.conformance.rig import Rig, cruising_speed
 from protocol.conformance.stand import TRIGGER
 from protocol.conformance.verdict import require
 
@@ -15,9 +15,10 @@ def h_reads_the_position(rig: Rig) -> None:
 
 @case("4.2/2", travel_deg=40)
 def a_position_is_of_the_time_of_its_reply(rig: Rig) -> None:
-    """At constant speed, fit a line through the positions and the times at which they can have been true."""
-    speed = rig.profile.motion.speed_deg_s / 2
-    rig.settings(speed, rig.profile.motion.acceleration_deg_s2)
+    """At constant speed read again and again: each step of the position is as long as the time between its readings."""
+    allowed = rig.profile.motion
+    speed = min(allowed.speed_deg_s / 2, cruising_speed(40, allowed.acceleration_deg_s2))
+    rig.settings(speed, allowed.acceleration_deg_s2)
     rig.move_to(40)
     begin_s = speed / rig.rate_deg_s2 + 0.1
     rig.follow(begin_s)

@@ -118,6 +118,23 @@ def test_a_session_that_is_interrupted_on_its_way_home_stops_the_table() -> None
     assert 40 < status.encoder_deg < 60  # on its way, where it was stopped
 
 
+@pytest.mark.parametrize(
+    "motion",
+    [
+        "reach_deg = 90\nspeed_deg_s = 5\nacceleration_deg_s2 = 5",
+        "reach_deg = 90\nspeed_deg_s = 5",
+        "reach_deg = 90\nacceleration_deg_s2 = 10",
+    ],
+)
+def test_a_right_table_that_may_only_be_moved_with_care_passes_too(motion: str, tmp_path: Path) -> None:
+    profile = profile_with(tmp_path, f"[motion]\n{motion}\n")
+    outcomes = run("emulator://", profile, ["4.1/5", "4.1/8", "4.1/11", "4.2/2", "6.1/3", "7.1", "7.3/5"])
+    bad = [
+        (outcome.case.id, outcome.reason) for outcome in outcomes if outcome.verdict in {Verdict.FAIL, Verdict.ERROR}
+    ]
+    assert bad == []
+
+
 def test_what_a_table_lacks_is_skipped_with_its_reason(tmp_path: Path) -> None:
     profile = profile_with(
         tmp_path, "[motion]\nreach_deg = 10\n[waive]\n'5.2/4' = 'its printf'\n[rig]\nsees_disconnect = false\n"
