@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import NoReturn
 
-from protocol.conformance.case import Case, chosen_cases
+from protocol.conformance.case import Case, chosen_cases, only
 from protocol.conformance.host_watch import watch_in
 from protocol.conformance.ports import described, is_simulated, open_port
 from protocol.conformance.profile import Profile, ProfileError, load_profile
@@ -16,7 +16,7 @@ from protocol.conformance.record import Header, RecordError, count_verdicts, rea
 from protocol.conformance.replay import replay
 from protocol.conformance.report import write_report
 from protocol.conformance.stand import Stand, StandError, stand_beside
-from protocol.conformance.suite import Outcome, Session, SessionError
+from protocol.conformance.suite import Outcome, Session, SessionError, session_at
 from protocol.conformance.verdict import Verdict
 from protocol.conformance.wire import RecordedPort, ReopenablePort, Wire
 
@@ -24,8 +24,11 @@ _EXAMPLE = """examples:
   python -m protocol.conformance --port emulator:// --out build/conformance
   python -m protocol.conformance --port /dev/ttyUSB0 --profile table.toml --case 7 --case 4.2/3 --out record
 
-Exit status: 0 when no case failed, 1 when one did, 2 when the table could not be tested or the run was interrupted.
+Exit status: 0 when no case failed, 1 when one did, 2 when the table could not be tested, 130 after Ctrl-C.
 """
+
+
+_INTERRUPTED = 130
 
 
 class UsageError(Exception):
@@ -51,8 +54,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _say(str(error))
         return 2
     except KeyboardInterrupt:
-        _say("interrupted; the table was stopped")
-        return 2
+        _say("interrupted")
+        return _INTERRUPTED
 
 
 def _on_the_table(options: argparse.Namespace, cases: Sequence[Case]) -> int:
@@ -84,7 +87,13 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         help="TOML file of what is known of this table (default: the stand-in's)",
     )
-    add("--case", metavar="PREFIX", action="append", default=[], help="only cases whose id begins so; may be repeated")
+    add(
+        "--case",
+        metavar="PREFIX",
+        action="append",
+        default=[],
+        help="only cases whose id begins so (with $ at the end: is so); may be repeated",
+    )
     add("--control", metavar="PATH", type=Path, help="the control channel of a running stand-in")
     add("--out", metavar="DIR", type=Path, help="where record.json, report.html and junit.xml go")
     add("--junit", metavar="FILE", type=Path, help="where JUnit's XML goes instead")
@@ -111,28 +120,37 @@ def _list(cases: Sequence[Case]) -> int:
 
 
 def _run(options: argparse.Namespace, profile: Profile, port: ReopenablePort, cases: Sequence[Case]) -> int:
-    options.out.mkdir(parents=True, exist_ok=True)
+    junit = options.junit or options.out / "junit.xml"
+    for directory in (options.out, junit.parent):
+        _make(directory)
     _confirm(options, profile, port)
     begun = None if is_simulated(port) else datetime.now().astimezone().isoformat(timespec="seconds")
     outcomes: list[Outcome] = []
+    status = 0
     with watch_in(simulated=is_simulated(port)) as watch:
         stand = stand_beside(port, options.control, profile)
-        session = Session(RecordedPort(port), profile, stand, options.seed, watch)
+        session = session_at(options.port, RecordedPort(port), profile, stand, options.seed, watch)
         header = Header(
             described(options.port), profile, options.seed, session.home_deg, sorted(session.capabilities), begun
         )
         try:
             session.run(cases, _progress(outcomes, len(cases), options))
         except KeyboardInterrupt:
-            _say(f"interrupted after {len(outcomes)} of {len(cases)} cases; the table was stopped")
+            status = _INTERRUPTED
+            _say(f"interrupted after {len(outcomes)} of {len(cases)} cases; {_how_it_was_left(session)}")
     write_record(options.out / "record.json", header, outcomes)
-    write_junit(options.junit or options.out / "junit.xml", header, outcomes)
+    write_junit(junit, header, outcomes)
     write_report(options.out / "report.html", header, outcomes, lambda case: _repeat(options, case))
     print(", ".join(f"{count} {verdict}" for verdict, count in count_verdicts(outcomes).items()) or "nothing was run")
     _say(f"the report is {options.out / 'report.html'}")
-    if len(outcomes) < len(cases):
-        return 2
-    return int(any(outcome.verdict in {Verdict.FAIL, Verdict.ERROR} for outcome in outcomes))
+    return status or int(any(outcome.verdict in {Verdict.FAIL, Verdict.ERROR} for outcome in outcomes))
+
+
+def _make(directory: Path) -> None:
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"{directory}: is no directory and cannot become one: {error.strerror}") from error
 
 
 def _progress(outcomes: list[Outcome], total: int, options: argparse.Namespace) -> Callable[[Outcome], None]:
@@ -162,7 +180,7 @@ def _repeat(options: argparse.Namespace, case: Case) -> str:
     for name in ("profile", "control"):
         if getattr(options, name) is not None:
             words += [f"--{name}", str(getattr(options, name))]
-    words += ["--case", case.id, "--seed", str(options.seed), "--out", str(options.out / "again")]
+    words += ["--case", only(case), "--seed", str(options.seed), "--out", str(options.out / "again")]
     return shlex.join(words + ["--yes"] * options.yes)
 
 
@@ -170,11 +188,7 @@ def _confirm(options: argparse.Namespace, profile: Profile, port: ReopenablePort
     """Let nothing real move before somebody has agreed to how far and how fast."""
     if options.yes or is_simulated(port):
         return
-    motion = profile.motion
-    limits = (
-        f"the table at {options.port} will turn by up to {motion.reach_deg:g} deg each way from where it stands, "
-        f"at up to {motion.speed_deg_s:g} deg/s and {motion.acceleration_deg_s2:g} deg/s2"
-    )
+    limits = f"the table at {options.port} will turn {profile.motion}"
     if not sys.stdin.isatty():
         raise UsageError(f"{limits}; say --yes if it may")
     _say(f"{limits}.")
@@ -190,7 +204,7 @@ def _replay(options: argparse.Namespace, profile: Profile, port: ReopenablePort)
     stand: Stand = stand_beside(port, options.control, profile)
     _confirm(options, profile, port)
     recorded_port = RecordedPort(port)
-    session = Session(recorded_port, profile, stand)
+    session = session_at(options.port, recorded_port, profile, stand)
     if session.home_deg != record.home_deg:
         raise SessionError(
             f"the table stands at {session.home_deg} deg, the record began at {record.home_deg}; bring it there first"
@@ -203,12 +217,17 @@ def _replay(options: argparse.Namespace, profile: Profile, port: ReopenablePort)
                 parting = replay(case, wire, stand, profile)
                 parted += parting is not None
                 print(f"{'parts' if parting else 'same':9} {case.id}{f': {parting}' if parting else ''}", flush=True)
+        session.end()
     except BaseException:
         session.stop()
+        _say(_how_it_was_left(session))
         raise
-    session.end()
     print(f"{parted} of {sum(case.id in wanted for case in record.cases)} cases part")
     return int(parted > 0)
+
+
+def _how_it_was_left(session: Session) -> str:
+    return "the table was stopped" if session.is_stopped else "the table does not answer: see to it that it has stopped"
 
 
 def _check_reach(recorded: Profile, allowed: Profile, path: Path) -> None:

@@ -61,6 +61,8 @@ def all_cases() -> list[Case]:
 def chosen_cases(prefixes: Sequence[str]) -> list[Case]:
     """Return the cases whose id begins with one of the prefixes, numbers taken whole: `4.1/1` is not `4.1/10`.
 
+    A prefix that ends in `$` is a whole id: `7.1/1$` is not `7.1/1:backwards`.
+
     Raises:
         ValueError: a prefix chooses none.
     """
@@ -71,6 +73,13 @@ def chosen_cases(prefixes: Sequence[str]) -> list[Case]:
     return [one for one in everything if not prefixes or any(_begins(one.id, prefix) for prefix in prefixes)]
 
 
+def only(case: Case) -> str:
+    """Return the prefix that chooses this case and no other: its id, with `$` behind it where others begin so too."""
+    return case.id if chosen_cases([case.id]) == [case] else f"{case.id}$"
+
+
 def _begins(identifier: str, prefix: str) -> bool:
+    if prefix.endswith("$"):
+        return identifier == prefix[:-1]
     rest = identifier.removeprefix(prefix)
     return identifier.startswith(prefix) and not (prefix[-1:].isdigit() and rest[:1].isdigit())

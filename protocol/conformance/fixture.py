@@ -14,7 +14,7 @@ import pytest
 
 from protocol.client import TableClient
 from protocol.conformance.ports import open_port
-from protocol.conformance.profile import Profile, load_profile
+from protocol.conformance.profile import Profile, ProfileError, load_profile
 from protocol.conformance.stand import POWER_CYCLE, TRIGGER, Stand, StandError, stand_beside
 from protocol.conformance.suite import SessionError
 from protocol.conformance.wire import ReopenablePort
@@ -33,7 +33,10 @@ class RotaryTable:
 
     def __init__(self, url: str, control: Path | None, profile: Path | None) -> None:
         self.url = url
-        self.profile: Profile = load_profile(profile)
+        try:
+            self.profile: Profile = load_profile(profile)
+        except ProfileError as error:
+            pytest.fail(str(error), pytrace=False)
         self._control = control
         self._opened = False
 
@@ -43,7 +46,7 @@ class RotaryTable:
         try:
             port = open_port(self.url, self.profile)
         except SessionError as error:
-            pytest.fail(str(error))
+            pytest.fail(str(error), pytrace=False)
         self._opened = True
         return port
 
@@ -87,7 +90,7 @@ class RotaryTable:
                 pytest.skip(f"lacks {capability}")
             deed(self._stand)
         except StandError as error:
-            pytest.fail(str(error))
+            pytest.fail(str(error), pytrace=False)
 
 
 @contextmanager

@@ -65,6 +65,12 @@ class MotionAllowed:
     speed_deg_s: float
     acceleration_deg_s2: float
 
+    def __str__(self) -> str:
+        return (
+            f"by up to {self.reach_deg:g} deg each way from where it stands, "
+            f"at up to {self.speed_deg_s:g} deg/s and {self.acceleration_deg_s2:g} deg/s2"
+        )
+
 
 @dataclass(frozen=True)
 class RigProfile:

@@ -24,7 +24,6 @@ _RUNS = 3
 """How often a case is run when its machine spoils it."""
 _PATIENCE_S = 30.0
 """How long a busy machine is given to calm down, before such a case is run again."""
-_PUNCTUAL = Punctual()
 
 
 class SessionError(Exception):
@@ -51,6 +50,7 @@ class Session:
     Attributes:
         capabilities: what cases may need and what there is.
         home_deg: where the session began, and each moving case begins.
+        is_stopped: whether the table was seen to rest when it was stopped last.
 
     Raises:
         SessionError: what is at the port does not answer, is no table of this protocol, or is in motion.
@@ -67,10 +67,14 @@ class Session:
         self._seed = seed
         self.capabilities = capabilities(stand, profile)
         self.home_deg = round(self._first_position_in_time())
-        self._is_home = False
+        self._is_home = self.is_stopped = False
+        self._was_left = False
 
     def run(self, cases: Iterable[Case], report: Callable[[Outcome], None] = lambda _: None) -> list[Outcome]:
-        """Run cases one after the other, and bring the table home; what breaks into it, as Ctrl-C, stops the table."""
+        """Run cases one after the other, and bring the table home; what breaks into it, as Ctrl-C, stops the table.
+
+        A table that was stopped so is left where it stands.
+        """
         outcomes = []
         try:
             for one in cases:
@@ -78,15 +82,25 @@ class Session:
                 report(outcomes[-1])
             self.end()
         except BaseException:
-            self.stop()
+            self._leave()
             raise
         return outcomes
 
     def run_case(self, case: Case) -> Outcome:
-        """Run one case and leave the table at rest; where this machine was late, a failure is run again."""
+        """Run one case and leave the table at rest; where this machine was late, a failure is run again.
+
+        What breaks into it stops the table, as in `run`.
+        """
         lacking = self._lacking(case)
         if lacking:
             return Outcome(case, Verdict.SKIPPED, lacking)
+        try:
+            return self._run_in_time(case)
+        except BaseException:
+            self._leave()
+            raise
+
+    def _run_in_time(self, case: Case) -> Outcome:
         allowed_s = self._profile.serial.latency_s
         spoiled: list[str] = []
         while True:
@@ -113,17 +127,25 @@ class Session:
 
     def stop(self) -> None:
         """Stop the table where it is, whatever is on the line, if it still answers."""
-        self._is_home = False
+        self._is_home = self.is_stopped = False
         with suppress(NonconformityError, OSError):
             self._wire.send(_CANCEL + b"R 0\r")
             self._wire.listen(_SETTLE_S)
             self._rig("stop").wait_for_rest()
+            self.is_stopped = True
 
     def end(self) -> None:
-        """Stop the table, and bring it back to where the session began."""
+        """Stop the table, and bring it back to where the session began, unless something broke into the session."""
+        if self._was_left:
+            return
         self.stop()
         with suppress(NonconformityError, OSError):
             self._go_home()
+
+    def _leave(self) -> None:
+        if not self._was_left:
+            self._was_left = True
+            self.stop()
 
     def _go_home(self) -> None:
         self._rig("home").go_home()
@@ -231,3 +253,21 @@ class Session:
         if readings[0] != readings[1]:
             raise SessionError(f"the table moves ({readings[0]}, then {readings[1]} deg); stop it first")
         return readings[1]
+
+
+def session_at(
+    url: str, port: RecordedPort, profile: Profile, stand: Stand, seed: int = 0, watch: Watch | None = None
+) -> Session:
+    """Begin a session; what is wrong with the table is told with the name of its port.
+
+    Raises:
+        SessionError: see `Session`; or the port fails.
+    """
+    try:
+        return Session(port, profile, stand, seed, watch)
+    except SessionError as error:
+        raise SessionError(f"{url}: {error}") from error
+    except OSError as error:
+        raise SessionError(
+            f"{url}: the port failed: {error}; check the table, and what is between it and here"
+        ) from error

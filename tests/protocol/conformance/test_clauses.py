@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from protocol.conformance.case import all_cases, chosen_cases
+from protocol.conformance.case import all_cases, chosen_cases, only
 from protocol.conformance.clauses import specification
 
 PAGE = Path(__file__).parents[3] / "docs" / "protocol.md"
@@ -38,6 +38,11 @@ def test_cases_are_chosen_by_whole_numbers() -> None:
     assert {case.id.partition(":")[0] for case in chosen_cases(["7.3/3"])} == {"7.3/3"}
     assert len(chosen_cases(["7", "2"])) == len(chosen_cases(["7"])) + len(chosen_cases(["2"]))
     assert chosen_cases([]) == all_cases()
+
+
+def test_each_case_has_a_prefix_that_chooses_it_alone() -> None:
+    for case in all_cases():
+        assert chosen_cases([only(case)]) == [case]
 
 
 def test_a_prefix_of_nothing_is_an_error() -> None:

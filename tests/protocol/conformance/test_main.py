@@ -1,6 +1,7 @@
 """The command line: records, reports, replays, exit statuses, and one clear line for what cannot be."""
 
 import json
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -64,6 +65,38 @@ def test_a_failure_says_which_clause_and_how_to_repeat_it(
     assert ET.parse(out / "junit.xml").getroot()[0].get("failures") == "1"  # noqa: S314 - our own file
 
 
+def test_the_command_that_repeats_a_case_repeats_no_other(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    profile = tmp_path / "table.toml"
+    profile.write_text("[tolerance]\nacceleration_share = 0.0001\n")
+    conformance("--port", "emulator://", "--profile", profile, "--case", "7.1/1", "--out", out)
+    again = next(line for line in capsys.readouterr().out.splitlines() if "again: " in line)
+    words = shlex.split(again.partition("again: python -m protocol.conformance ")[2])
+    assert conformance(*words) == 1
+    assert capsys.readouterr().out.endswith("\n1 fail\n")
+
+
+def test_junit_goes_where_it_is_told_to(out: Path, tmp_path: Path) -> None:
+    file = tmp_path / "reports" / "of today" / "table.xml"
+    assert conformance("--port", "emulator://", "--case", "2.1/2", "--out", out, "--junit", file) == 0
+    assert ET.parse(file).getroot()[0].get("tests") == "1"  # noqa: S314 - our own file
+    assert not (out / "junit.xml").exists()
+
+
+def test_a_place_that_is_no_directory_is_refused_before_the_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("precious")
+    file, inside = str(tmp_path / "file"), str(tmp_path / "file" / "x.xml")
+    for words in (["--out", file], ["--out", str(tmp_path), "--junit", inside]):
+        assert conformance("--port", "emulator://", *words) == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert f"{tmp_path / 'file'}: is no directory and cannot become one" in said.err
+    assert (tmp_path / "file").read_text() == "precious"
+
+
 def test_the_list_shows_clauses_and_needs(capsys: pytest.CaptureFixture[str]) -> None:
     assert conformance("--list", "--case", "6.2/1") == 0
     line = capsys.readouterr().out
@@ -78,7 +111,7 @@ def test_the_list_shows_clauses_and_needs(capsys: pytest.CaptureFixture[str]) ->
         (["--port", "emulator://"], "give --port URL and --out DIR"),
         (["--port", "emulator://", "--out", "OUT", "--case", "12"], "--case: no case begins with 12"),
         (["--port", "/dev/no-such-table", "--out", "OUT"], "cannot open /dev/no-such-table"),
-        (["--port", "loop://", "--out", "OUT", "--yes"], "this is no table of this protocol"),
+        (["--port", "loop://", "--out", "OUT", "--yes"], "loop://: 'H' got b'H\\r', which is no position; this is no"),
         (["--port", "loop://", "--out", "OUT"], "deg/s2; say --yes if it may"),
         (["--port", "emulator://", "--out", "OUT", "--profile", "none.toml"], "none.toml: cannot be read"),
         (["--port", "emulator://", "--out", "OUT", "--control", "none"], "none: "),

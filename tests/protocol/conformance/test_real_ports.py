@@ -61,7 +61,7 @@ def test_ctrl_c_stops_the_table_and_leaves_the_record(stand_in: StandIn, tmp_pat
         wait_for_motion(stand_in.control)
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=60)
-    assert process.returncode == 2
+    assert process.returncode == 130
     assert "interrupted after 0 of 1 cases; the table was stopped" in said
     state = state_of(stand_in.control)
     assert state["state"] == "idle"

@@ -77,18 +77,28 @@ def test_a_session_ends_where_it_began() -> None:
 def test_an_interrupted_session_stops_the_table() -> None:
     port = port_to(Mutant)
     session = Session(RecordedPort(port), load_profile(), InProcess(port.table))
-    case = chosen_cases(["7.1/1"])[0]
-
-    def interrupted(rig: Rig) -> None:
-        rig.move_to(300)
-        rig.follow(1.0)
-        raise KeyboardInterrupt
-
     with pytest.raises(KeyboardInterrupt):
-        session.run([dataclasses.replace(case, run=interrupted)])
+        session.run([dataclasses.replace(chosen_cases(["7.1/1"])[0], run=interrupted)])
     status = port.table.status()
     assert status.state == "idle"
     assert 20 < status.encoder_deg < 60  # where it was, and not at home
+
+
+def interrupted(rig: Rig) -> None:
+    rig.move_to(300)
+    rig.follow(1.0)
+    raise KeyboardInterrupt
+
+
+def test_an_interrupted_case_leaves_the_table_where_it_stopped_when_the_session_ends() -> None:
+    port = port_to(Mutant)
+    session = Session(RecordedPort(port), load_profile(), InProcess(port.table))
+    with pytest.raises(KeyboardInterrupt):
+        session.run_case(dataclasses.replace(chosen_cases(["7.1/1"])[0], run=interrupted))
+    session.end()  # as pytest does, which ends its fixtures after Ctrl-C
+    status = port.table.status()
+    assert status.state == "idle"
+    assert 20 < status.encoder_deg < 60
 
 
 class InterruptedOnItsWay(RecordedPort):
@@ -133,6 +143,16 @@ def test_a_right_table_that_may_only_be_moved_with_care_passes_too(motion: str, 
         (outcome.case.id, outcome.reason) for outcome in outcomes if outcome.verdict in {Verdict.FAIL, Verdict.ERROR}
     ]
     assert bad == []
+
+
+def test_a_table_that_does_not_answer_is_not_called_stopped() -> None:
+    port = port_to(Mutant)
+    session = Session(RecordedPort(port), load_profile(), InProcess(port.table))
+    session.stop()
+    assert session.is_stopped
+    port.table.inject(fault_from("silence", {}))
+    session.stop()
+    assert not session.is_stopped
 
 
 def test_what_a_table_lacks_is_skipped_with_its_reason(tmp_path: Path) -> None:
