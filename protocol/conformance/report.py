@@ -8,7 +8,7 @@ from itertools import groupby
 from pathlib import Path
 from string import Template
 
-from protocol.conformance.case import Case
+from protocol.conformance.case import Case, all_cases
 from protocol.conformance.record import Header, count_verdicts, versions, write_whole
 from protocol.conformance.reference import MotionRecord
 from protocol.conformance.suite import Outcome
@@ -29,6 +29,7 @@ _LINE_STEP_S = 0.01
 _SPEED_WINDOW_S = 0.06
 _MOST_POINTS = 900
 
+_BAD = {Verdict.FAIL, Verdict.ERROR}
 _EMPHASIS = re.compile(r"\*([^*]+)\*")
 
 Repeat = Callable[[Case], str]
@@ -52,6 +53,7 @@ def write_report(path: Path, header: Header, outcomes: Sequence[Outcome], repeat
             table=escape(f"{header.profile.table.name} at {header.device}"),
             sums=sums,
             strip=strip,
+            failed=_failed(outcomes),
             facts=facts,
             chapters="".join(_chapters(outcomes, repeat)),
         ),
@@ -60,20 +62,32 @@ def write_report(path: Path, header: Header, outcomes: Sequence[Outcome], repeat
 
 def _facts(header: Header, outcomes: Sequence[Outcome]) -> list[tuple[str, str]]:
     motion, serial = header.profile.motion, header.profile.serial
+    decimals = "1 decimal" if serial.decimals == 1 else f"{serial.decimals} decimals"
     in_motion_s = sum(outcome.seconds for outcome in outcomes if outcome.case.travel_deg)
     all_s = sum(outcome.seconds for outcome in outcomes)
     return [
         ("begun", header.begun or "in simulated time"),
+        ("cases", f"{len(outcomes)} of the suite's {len(all_cases())}"),
         ("took", f"{all_s:.0f} s on the table's clock, {in_motion_s:.0f} s of it in cases that move the table"),
         (
             "may be moved",
             f"{motion.reach_deg:g} deg each way, {motion.speed_deg_s:g} deg/s, {motion.acceleration_deg_s2:g} deg/s2",
         ),
-        ("line", f"{serial.baud or 'any'} baud, {serial.decimals} decimals, latency {1000 * serial.latency_s:g} ms"),
+        ("line", f"{serial.baud or 'any'} baud, {decimals}, latency {1000 * serial.latency_s:g} ms"),
         ("can be used", ", ".join(header.capabilities)),
         ("seed", str(header.seed)),
         ("versions", ", ".join(f"{name} {text}" for name, text in versions().items())),
     ]
+
+
+def _failed(outcomes: Sequence[Outcome]) -> str:
+    """Return what failed, each with its reason and a link to it."""
+    rows = "".join(
+        f'<li><a href="#{outcome.case.id}"><code>{outcome.case.id}</code></a><span>{escape(outcome.reason)}</span></li>'
+        for outcome in outcomes
+        if outcome.verdict in _BAD
+    )
+    return f'<ul class="failed">{rows}</ul>' if rows else ""
 
 
 def _chapters(outcomes: Sequence[Outcome], repeat: Repeat) -> list[str]:
@@ -86,7 +100,7 @@ def _chapters(outcomes: Sequence[Outcome], repeat: Repeat) -> list[str]:
 
 def _case(outcome: Outcome, repeat: Repeat) -> str:
     case, verdict = outcome.case, outcome.verdict
-    bad = verdict in {Verdict.FAIL, Verdict.ERROR}
+    bad = verdict in _BAD
     parts = [
         f'<details id="{case.id}"{" open" if bad else ""}><summary><span class="chip {verdict}">{verdict}</span>'
         f'<code>{case.id}</code><span class="soft">{case.clause.level}</span><span>{_marked(case.clause.text)}</span>'
@@ -166,7 +180,7 @@ def _wire(events: Sequence[Event]) -> str:
 
 
 def _shown(data: bytes) -> str:
-    return escape(data.decode("latin-1").encode("unicode_escape").decode().replace("\\r", "\u240d"), quote=False)
+    return escape(data.decode("latin-1").encode("unicode_escape").decode().replace("\\r", "\u21b5"), quote=False)
 
 
 def _marked(text: str) -> str:

@@ -77,6 +77,17 @@ def test_the_command_that_repeats_a_case_repeats_no_other(
     assert capsys.readouterr().out.endswith("\n1 fail\n")
 
 
+def test_the_report_begins_with_what_failed(out: Path, tmp_path: Path) -> None:
+    profile = tmp_path / "table.toml"
+    profile.write_text(TOO_STRICT)
+    conformance("--port", "emulator://", "--profile", profile, "--case", "7.1/1", "--out", out)
+    report = (out / "report.html").read_text()
+    first = report.index('<a href="#7.1/1:backwards"><code>7.1/1:backwards</code></a><span>top speed ')
+    assert first < report.index("<h2>")
+    assert 'href="#7.1/1"><code>' not in report  # it passed
+    assert "2 of the suite" in report
+
+
 def test_junit_goes_where_it_is_told_to(out: Path, tmp_path: Path) -> None:
     file = tmp_path / "reports" / "of today" / "table.xml"
     assert conformance("--port", "emulator://", "--case", "2.1/2", "--out", out, "--junit", file) == 0
