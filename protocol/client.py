@@ -38,7 +38,9 @@ class TableClient:
 
     @classmethod
     def open(cls, url: str, baud: int = 9600, timeout_s: float = 1.0, decimals: int = 1) -> Self:
-        """Open a device or any pyserial URL: `/dev/ttyUSB0`, `socket://localhost:7000`, `emulator://`.
+        """Open a device or any URL of pyserial's: `/dev/ttyUSB0`, `socket://localhost:7000`.
+
+        Once the package `emulator` is imported, `emulator://` too.
 
         Raises:
             PortError: the port cannot be opened.

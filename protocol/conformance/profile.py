@@ -137,7 +137,7 @@ def profile_from(values: Mapping[str, Any], source: str) -> Profile:
         _section(Tolerance, values, "tolerance", source),
         _section(MotionAllowed, values, "motion", source),
         _section(RigProfile, values, "rig", source),
-        dict(values["waive"]),
+        {number: str(_value(str, reason, f"{source}: waive.{number}")) for number, reason in values["waive"].items()},
     )
     _check_together(profile, source)
     return profile

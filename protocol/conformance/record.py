@@ -117,7 +117,7 @@ def read_record(path: Path) -> Record:
 
 
 def write_junit(path: Path, header: Header, outcomes: Sequence[Outcome]) -> None:
-    """Write the verdicts as JUnit's ET."""
+    """Write the verdicts as JUnit's XML; it appears under its name when it is whole."""
     counts = count_verdicts(outcomes)
     numbers = {"tests": len(outcomes), "failures": counts.get(Verdict.FAIL, 0), "errors": counts.get(Verdict.ERROR, 0)}
     seconds = sum(outcome.seconds for outcome in outcomes)

@@ -2,7 +2,7 @@
 
 import re
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from decimal import Decimal
@@ -14,7 +14,7 @@ from protocol.conformance.profile import Profile
 from protocol.conformance.reference import MotionRecord
 from protocol.conformance.rig import Rig
 from protocol.conformance.stand import PRESET, RecordedStand, Stand, StandError, capabilities
-from protocol.conformance.verdict import Measurement, NonconformityError, Verdict
+from protocol.conformance.verdict import InapplicableError, Measurement, NonconformityError, Verdict
 from protocol.conformance.wire import Event, RecordedPort, Wire
 
 _CANCEL = b"\x18\r"
@@ -166,6 +166,8 @@ class Session:
             case.run(rig)
             rig.silence("after its last reply the table")
             self._restore(case, rig)
+        except InapplicableError as error:
+            return Verdict.SKIPPED, str(error)
         except NonconformityError as error:
             self._after_failure(case, rig)
             return Verdict.FAIL, str(error)
@@ -177,11 +179,7 @@ class Session:
         except Exception as error:  # a fault of the case itself ends that case alone
             self._after_failure(case, rig)
             return Verdict.ERROR, "".join(traceback.format_exception_only(error)).strip()
-        failed = [measurement for measurement in rig.measurements if measurement.verdict is Verdict.FAIL]
-        marginal = [measurement for measurement in rig.measurements if measurement.verdict is Verdict.MARGINAL]
-        if failed:
-            return Verdict.FAIL, "; ".join(map(str, failed))
-        return (Verdict.MARGINAL, "; ".join(map(str, marginal))) if marginal else (Verdict.PASS, "")
+        return _verdict_on(rig.measurements)
 
     def _lacking(self, case: Case) -> str:
         """Return why a case cannot be run, or nothing."""
@@ -253,6 +251,14 @@ class Session:
         if readings[0] != readings[1]:
             raise SessionError(f"the table moves ({readings[0]}, then {readings[1]} deg); stop it first")
         return readings[1]
+
+
+def _verdict_on(measurements: Sequence[Measurement]) -> tuple[Verdict, str]:
+    for worst in (Verdict.FAIL, Verdict.MARGINAL):
+        found = [str(measurement) for measurement in measurements if measurement.verdict is worst]
+        if found:
+            return worst, "; ".join(found)
+    return Verdict.PASS, ""
 
 
 def session_at(

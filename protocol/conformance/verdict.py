@@ -22,6 +22,10 @@ class NonconformityError(Exception):
     """The table did not do what the clause says; the message says what it did instead."""
 
 
+class InapplicableError(Exception):
+    """A case finds that it cannot be done where it is; the message says what is lacking."""
+
+
 def require(condition: bool, otherwise: str) -> None:
     """Raise NonconformityError unless the condition holds."""
     if not condition:

@@ -56,4 +56,5 @@ def _client_agrees(rig: Rig) -> None:
     client = TableClient(rig.wire.port, rig.profile.serial.timeout_s)
     position = client.position_deg()
     rig.wire.listen(0.1)
-    require(position == float(rig.read()), f"the client read {position}, the suite {rig.read()}")
+    own = rig.read()
+    require(position == float(own), f"the client read {position}, the suite {own}")

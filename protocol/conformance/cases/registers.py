@@ -13,7 +13,8 @@ def position_and_latch_are_two_registers(rig: Rig) -> None:
     latched = rig.read(b"L")
     rig.move_to(10)
     rig.finish()
-    require(rig.read(b"L") == latched, f"the latch went from {latched} to {rig.read(b'L')} deg without a trigger")
+    later = rig.read(b"L")
+    require(later == latched, f"the latch went from {latched} to {later} deg without a trigger")
 
 
 @case("6.1/3", PRESET, travel_deg=10)

@@ -76,5 +76,5 @@ def r_0_at_rest_moves_nothing(rig: Rig) -> None:
 def an_increment_beyond_half_the_counter_is_refused(rig: Rig) -> None:
     """Command increments just beyond half the counter's range."""
     with rig.unmoved(b"an increment beyond half the counter"):
-        for way in (rig.profile.range_deg, -rig.profile.range_deg - 0.1):
+        for way in (rig.profile.range_deg + 0.1, -rig.profile.range_deg - 0.1):
             rig.refused(b"R " + number(way), _OUT_OF_RANGE)

@@ -46,6 +46,7 @@ def test_a_profile_survives_its_record() -> None:
         ("[rig]\ntrigger_command = 'beep'\n", r"rig.trigger_command is 'beep'; it must be a list of words"),
         ("[waive]\n'4.1/1' = 'no'\n", r"waive names 4.1/1, which is a must"),
         ("[waive]\n'9.9/9' = 'no'\n", r"waive names 9.9/9, which is no clause"),
+        ("[waive]\n'5.2/4' = 3\n", r"waive.5.2/4 is 3; it must be a text"),
         ("[serial]\nparity = 1\n", r"serial.parity is not a key; allowed are baud, decimals"),
         ("[nonsense]\na = 1\n", r"\[nonsense\] is no section; there are table, serial"),
         ("motion = 3\n", r"motion must be a section, not 3"),

@@ -174,6 +174,16 @@ def test_what_a_table_lacks_is_skipped_with_its_reason(tmp_path: Path) -> None:
     }
 
 
+def test_a_case_that_cannot_be_done_where_the_table_stands_is_skipped() -> None:
+    port = port_to(Mutant)
+    port.write(b"P 33\r")
+    port.clock.sleep_s(10)
+    session = Session(RecordedPort(port), load_profile(), InProcess(port.table))
+    outcomes = session.run(chosen_cases(["5.2/5:motion", "7.2/1"]))
+    assert [outcome.verdict for outcome in outcomes] == [Verdict.SKIPPED, Verdict.PASS]
+    assert outcomes[0].reason == "the session began at 33 deg, not at 0"
+
+
 def test_a_port_that_dies_is_an_error_of_the_case() -> None:
     port = port_to(Mutant)
     session = Session(RecordedPort(port), load_profile(), InProcess(port.table))
