@@ -1,0 +1,101 @@
+"""Wrong tables: the grammar of a command."""
+
+import re
+from decimal import Decimal
+
+from protocol.messages import Command, Verb
+from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by
+
+
+@caught_by("4.1/1")
+class TakesLowerCase(Mutant):
+    """lower case is as good"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(data.upper())
+
+
+@caught_by("4.1/4")
+class TakesTheFirstNumber(Mutant):
+    """of two numbers the first is taken"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(re.sub(rb"([PRSA] [0-9.]+) [0-9. ]+\r", rb"\1\r", data))
+
+
+@caught_by("4.1/7")
+class TakesExponents(Mutant):
+    """numbers are read as a programming language reads them"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(re.sub(rb"1e4\r", b"10000\r", data))
+
+
+@caught_by("4.1/8")
+class OneDecimal(Mutant):
+    """decimals after the first are dropped"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(re.sub(rb"(\.[0-9])[0-9]+", rb"\1", data))
+
+
+@caught_by("4.1/10")
+class StopsWhenItRefuses(Mutant):
+    """a refused line stops the motion"""
+
+    def _reply(self, command: Line) -> bytes:
+        reply = super()._reply(command)
+        if reply.startswith(b"ERR"):
+            super()._reply(Command(Verb.MOVE_BY, Decimal(0)))
+        return reply
+
+
+@caught_by("4.6/3")
+class SaysOkFirst(Mutant):
+    """OK comes before the number is looked at"""
+
+    def _reply(self, command: Line) -> bytes:
+        reply = super()._reply(command)
+        return b"OK\r" if isinstance(command, Command) and reply.startswith(b"ERR") else reply
+
+
+@caught_by("4.1/2")
+class RefusesSpacesBehind(Mutant):
+    """spaces before the CR are refused"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(re.sub(rb"([0-9]) +\r", rb"\1x\r", data))
+
+
+@caught_by("4.1/3")
+class OverlooksWhatFollows(Mutant):
+    """what follows a reading's letter is overlooked"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(re.sub(rb"(^|\r)([HL])[^\r]+(?=\r)", rb"\1\2", data))
+
+
+@caught_by("4.1/5")
+class KnowsNoPlus(Mutant):
+    """a plus sign is refused"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(data.replace(b"+", b"x"))
+
+
+@caught_by("4.1/6")
+class TakesHalfAPoint(Mutant):
+    """a point needs no digit before it"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(re.sub(rb"([PRSA] -?)\.([0-9])", rb"\g<1>0.\2", data))
+
+
+@caught_by("4.1/9")
+class LongNumbersWrap(Mutant):
+    """a number too long for the machine wraps"""
+
+    def _reply(self, command: Line) -> bytes:
+        if isinstance(command, Command) and command.value is not None:
+            command = Command(command.verb, command.value % 2**15 if abs(command.value) > 2**31 else command.value)
+        return super()._reply(command)
