@@ -95,7 +95,8 @@ class Rig(WireChecks):
             with suppress(NonconformityError):  # what the switch did not do is the news
                 self.home_deg += round(self.read() - before)
             raise
-        self.home_deg += round(self.read() - before)
+        self.home_deg -= round(before)  # what it stands at should be 0 now, even if the next reply is missing
+        self.home_deg += round(self.read())
 
     def move_to(self, angle_deg: float) -> None:
         """Command P, relative to home."""
