@@ -139,7 +139,7 @@ def report(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -> str:
         f"+ value {cost.value:.4f} + pauses {cost.pauses:.4f}",
         f"pauses        {len(plan.pauses)}",
         f"planned in    {1e3 * (plan.computing_time_s or 0.0):.2f} ms",
-        f"margins       {checked.clearance_deg:.2f} deg to the nearest forbidden cell, "
+        f"margins       {checked.clearance_deg:.2f} deg to the nearest forbidden sample, "
         f"{checked.speed_margin_deg_s:.2f} deg/s to the speed limit, "
         f"{checked.acceleration_margin_deg_s2:.2f} deg/s^2 to the acceleration limit",
         f"arm           {_arm_verdict(joints)}",
