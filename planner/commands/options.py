@@ -34,7 +34,7 @@ def add_wire(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--baud", type=whole_number(0, 1_000_000), default=9600, metavar="N", help="default 9600")
     parser.add_argument(
         "--decimals",
-        type=whole_number(0, 6),
+        type=whole_number(1, 6),
         default=1,
         metavar="N",
         help="places after the point on the wire (default 1)",
@@ -53,6 +53,15 @@ def add_stand_in(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--control", type=Path, metavar="PATH", help="the control channel of a stand-in at --port, to see inside it"
     )
+
+
+def fresh_table(url: str, **wanted: int) -> str:
+    """Return a port's URL; a table that `emulator://` makes gets what is wanted, unless told others."""
+    if not url.startswith("emulator://"):
+        return url
+    told = url.partition("?")[2]
+    missing = [f"{key}={value}" for key, value in wanted.items() if f"{key}=" not in told]
+    return "emulator://?" + "&".join(([told] if told else []) + missing)
 
 
 def whole_number(least: int, most: int) -> Callable[[str], int]:

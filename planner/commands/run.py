@@ -62,7 +62,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 def run(arguments: argparse.Namespace) -> int:
     """Run the plan, write what happened, print the verdict, and return the exit status."""
     asked = RunOptions(
-        port=arguments.port,
+        port=options.fresh_table(arguments.port, decimals=arguments.decimals),
         baud=arguments.baud,
         decimals=arguments.decimals,
         timeout_s=arguments.timeout,

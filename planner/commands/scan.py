@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.mesh is not None:
         scan = with_mesh(scan, arguments.mesh)
     asked = ScanOptions(
-        port=_port(arguments.port, arguments.decimals, arguments.seed),
+        port=options.fresh_table(arguments.port, decimals=arguments.decimals, seed=arguments.seed),
         baud=arguments.baud,
         decimals=arguments.decimals,
         control=arguments.control,
@@ -108,12 +108,3 @@ def summary(scanned: Scanned) -> str:
         *(f"  {name:22} {alone:>12} {across:>8} {without:>8}".rstrip() for name, alone, across, without in shares),
     ]
     return "\n".join(lines) + "\n"
-
-
-def _port(url: str, decimals: int, seed: int) -> str:
-    """Return the URL; a table that is made for this scan gets the scan's decimals and seed, unless told others."""
-    if not url.startswith("emulator://"):
-        return url
-    told = url.partition("?")[2]
-    wanted = [f"{key}={value}" for key, value in (("decimals", decimals), ("seed", seed)) if f"{key}=" not in told]
-    return "emulator://?" + "&".join(([told] if told else []) + wanted)

@@ -3,7 +3,7 @@ import argparse
 import pytest
 
 from planner.__main__ import main
-from planner.commands.options import positive_number, whole_number
+from planner.commands.options import fresh_table, positive_number, whole_number
 
 
 @pytest.mark.parametrize("text", ["8", " 9 ", "360"])
@@ -34,3 +34,17 @@ def test_a_run_is_not_begun_with_an_option_that_cannot_be_meant(
         main(["run", "plan.json", "--port", "emulator://", "--out", "run", *option])
     assert exit_status.value.code == 2
     assert f"argument {option[0]}: is {option[1]}; allowed is" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("url", "opened"),
+    [
+        ("emulator://", "emulator://?decimals=3&seed=7"),
+        ("emulator://?seed=2", "emulator://?seed=2&decimals=3"),
+        ("emulator://?decimals=1&seed=2", "emulator://?decimals=1&seed=2"),
+        ("/dev/ttyUSB0", "/dev/ttyUSB0"),
+        ("socket://127.0.0.1:7000", "socket://127.0.0.1:7000"),
+    ],
+)
+def test_a_table_made_for_a_command_is_as_the_command_wants_unless_told_others(url: str, opened: str) -> None:
+    assert fresh_table(url, decimals=3, seed=7) == opened
