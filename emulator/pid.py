@@ -50,11 +50,6 @@ def pid(config: TableConfig) -> Pid:
     return Pid(fixed_gains(config, config.gains.ramp), fixed_gains(config, config.gains.hold), config.driver.duty_max)
 
 
-def duty_max(config: TableConfig) -> int:
-    """Return the PWM steps at full duty."""
-    return config.driver.duty_max
-
-
 def fixed_gains(config: TableConfig, gains: GainsConfig) -> Gains:
     """Return a gain set of a table as the firmware holds it.
 

@@ -10,12 +10,9 @@ from numpy.typing import NDArray
 from emulator.batch import COLUMNS, MOVE_BY, MOVE_TO, run
 from emulator.config import GainsConfig, GainSetsConfig, TableConfig
 from emulator.drive_train import at_standstill
-from emulator.encoder import count_at
-from emulator.firmware import power_on
 from emulator.fixed_point import POSITION_BITS, SPEED_BITS, to_fixed
-from emulator.pid import duty_max
 from emulator.profiler import Profile
-from emulator.tick import TableConstants, TableState, table_constants
+from emulator.tick import TableConstants, TableState, table_constants, woken
 
 Array = NDArray[np.float64]
 
@@ -62,8 +59,7 @@ def switched_on(config: TableConfig, seed: int) -> tuple[TableConstants, TableSt
     chance = Random(seed)  # noqa: S311  # where a gear stands is no secret
     constants = table_constants(config, encoder_phase=chance.random())
     drive = at_standstill(constants.drive, gap_share=chance.uniform(-1.0, 1.0))
-    controller = power_on(constants.firmware, Profile.of(1, 1), count_at(constants.encoder, drive.angle_rad))
-    return constants, TableState(drive, controller, 0)
+    return constants, woken(constants, drive, Profile.of(1, 1))
 
 
 def motion_rows(config: TableConfig, motions: list[Motion]) -> NDArray[np.int64]:
@@ -103,6 +99,6 @@ def emulate(
         measured_deg_s=column["measured"] / window * tick_hz / count_deg,
         motor_speed_deg_s=np.degrees(column["motor_speed_rad_s"]) / config.gears.ratio,
         true_speed_deg_s=np.degrees(column["table_speed_rad_s"]),
-        duty=column["duty"] / duty_max(config),
+        duty=column["duty"] / config.driver.duty_max,
         motion=column["motion"],
     )

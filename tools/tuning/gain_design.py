@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from emulator.fixed_point import GAIN_BITS, INT32_MAX, INTEGRAL_GAIN_BITS
-from emulator.pid import Gains, duty_max
+from emulator.pid import Gains
 from tools.tuning.bounds import Bound, violation
 from tools.tuning.frequency_response import Array
 from tools.tuning.linear_model import speed_quantum_deg_s
@@ -87,7 +87,7 @@ def _registers(loops: Loops, points: Array) -> Array:
     config = loops.config
     tick_s = 1.0 / config.control.tick_hz
     duty_s_deg = np.exp(points[:, 0]) / loops.speed_gain_deg_s[0]
-    steps = duty_s_deg * duty_max(config) * speed_quantum_deg_s(config)
+    steps = duty_s_deg * config.driver.duty_max * speed_quantum_deg_s(config)
     integral = steps * tick_s / np.exp(points[:, 1])
     derivative = steps * np.maximum(points[:, 2], 0.0) * config.control.speed_window_ticks
     scaled = np.stack(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from emulator.config import TableConfig
 from emulator.fixed_point import GAIN_BITS, INTEGRAL_GAIN_BITS
-from emulator.pid import Gains, duty_max
+from emulator.pid import Gains
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def duty_gains(config: TableConfig, gains: Gains | Array) -> Array:
     """
     quantum_deg_s = speed_quantum_deg_s(config)
     scale = np.array([2.0**-GAIN_BITS, 2.0**-INTEGRAL_GAIN_BITS, 2.0**-GAIN_BITS])
-    result: Array = np.asarray(gains, dtype=np.float64) * scale / (duty_max(config) * quantum_deg_s)
+    result: Array = np.asarray(gains, dtype=np.float64) * scale / (config.driver.duty_max * quantum_deg_s)
     return result
 
 
@@ -123,7 +123,7 @@ def quantisation_noise(config: TableConfig) -> tuple[float, float]:
 
     Rounding to a step is taken as white noise, uniform over the step: step / sqrt(12).
     """
-    return 360.0 / config.counts_per_turn / sqrt(12.0), 1.0 / duty_max(config) / sqrt(12.0)
+    return 360.0 / config.counts_per_turn / sqrt(12.0), 1.0 / config.driver.duty_max / sqrt(12.0)
 
 
 def moving_friction_Nm(config: TableConfig) -> float:
