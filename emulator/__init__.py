@@ -5,9 +5,10 @@ Importing it teaches pyserial the port `emulator://`, a private table in virtual
 
 import serial
 
-from emulator.config import ConfigError, TableConfig, load_config
+from emulator.config import TableConfig, load_config
 from emulator.status import TableStatus
 from emulator.table import Table
+from emulator.toml_section import ConfigError
 
 __all__ = ["ConfigError", "Table", "TableConfig", "TableStatus", "load_config"]
 

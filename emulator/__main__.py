@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from emulator.clock import Clock
-from emulator.config import ConfigError, TableConfig, load_config
+from emulator.config import TableConfig, load_config
 from emulator.port import Port
 from emulator.server import SERVED_SIGNALS, Server
 from emulator.signals import SignalWatch
 from emulator.table import Table
 from emulator.tcp_port import TcpPort, parse_address
+from emulator.toml_section import ConfigError
 
 _EXAMPLE = """example:
   python -m emulator --pty --link ./table &

@@ -3,25 +3,16 @@
 The numbers themselves, and where each comes from, are in `default.toml`.
 """
 
-import math
 import tomllib
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Self, get_type_hints
+from typing import Any, Self
 
 from emulator.faults import Fault, FaultError, fault_from
 from emulator.fixed_point import SPEED_BITS, gain_registers
+from emulator.toml_section import ConfigError, merged, quantity, section
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
-
-
-class ConfigError(ValueError):
-    """A configuration that cannot be used; the message names the file, the key and what is allowed."""
-
-
-def quantity(*, above: float | None = None, least: float | None = None, most: float | None = None) -> Any:  # noqa: ANN401  # stands for a value of the annotated type
-    """Declare a number that must be > `above`, >= `least` and <= `most`."""
-    return field(metadata={"above": above, "least": least, "most": most})
 
 
 @dataclass(frozen=True)
@@ -182,8 +173,8 @@ class TableConfig:
         """
         serial = self.serial
         chosen = {key: value for key, value in changes.items() if value is not None}
-        merged = {entry.name: getattr(serial, entry.name) for entry in fields(serial)} | chosen
-        return replace(self, serial=_section(SerialConfig, merged, "serial settings", "serial"))
+        values = {entry.name: getattr(serial, entry.name) for entry in fields(serial)} | chosen
+        return replace(self, serial=section(SerialConfig, values, "serial settings", "serial"))
 
 
 def load_config(path: str | Path | None = None) -> TableConfig:
@@ -196,8 +187,8 @@ def load_config(path: str | Path | None = None) -> TableConfig:
     source = DEFAULT_FILE.name if path is None else str(path)
     changes = {} if path is None else _read(Path(path))
     faults = _faults(changes.pop("faults", []), f"{source}: faults")
-    merged = _merged(defaults, changes, source, "") | {"faults": faults}
-    config: TableConfig = _section(TableConfig, merged, source, "")
+    values = merged(defaults, changes, source) | {"faults": faults}
+    config: TableConfig = section(TableConfig, values, source)
     _check_together(config, source)
     return config
 
@@ -211,34 +202,6 @@ def _read(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: is not TOML: {error}") from error
 
 
-def _merged(defaults: dict[str, Any], changes: dict[str, Any], source: str, where: str) -> dict[str, Any]:
-    result = dict(defaults)
-    for key, value in changes.items():
-        if key not in defaults:
-            raise ConfigError(f"{source}: {where + key} is not a key; allowed here are {', '.join(defaults)}")
-        nested = isinstance(defaults[key], dict)
-        if nested and not isinstance(value, dict):
-            raise ConfigError(f"{source}: {where + key} must be a section, not {value!r}")
-        result[key] = _merged(defaults[key], value, source, f"{where}{key}.") if nested else value
-    return result
-
-
-def _section(kind: type[Any], values: dict[str, Any], source: str, where: str) -> Any:  # noqa: ANN401  # an instance of `kind`
-    types = get_type_hints(kind)
-    arguments: dict[str, Any] = {}
-    for entry in fields(kind):
-        name = f"{where}.{entry.name}" if where else entry.name
-        wanted, value = types[entry.name], values[entry.name]
-        if isinstance(value, tuple):
-            arguments[entry.name] = value  # the faults, which have been looked at
-        elif is_dataclass(wanted):
-            arguments[entry.name] = _section(wanted, value, source, name)  # type: ignore[arg-type]  # a dataclass's type
-        else:
-            arguments[entry.name] = _number(wanted, value, entry.metadata, f"{source}: {name}")
-    constructor: Any = kind
-    return constructor(**arguments)
-
-
 def _faults(entries: object, where: str) -> tuple[Fault, ...]:
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise ConfigError(f"{where} is {entries!r}; each fault is a table of its own, [[faults]]")
@@ -249,27 +212,6 @@ def _faults(entries: object, where: str) -> tuple[Fault, ...]:
         )
     except FaultError as error:
         raise ConfigError(f"{where}: {error}") from error
-
-
-def _number(wanted: type, value: object, limits: Any, where: str) -> float | int | bool:  # noqa: ANN401  # a field's metadata
-    if wanted is bool or isinstance(value, bool):
-        if wanted is bool and isinstance(value, bool):
-            return value
-        raise ConfigError(f"{where} is {value!r}; it must be {'true or false' if wanted is bool else 'a number'}")
-    if not isinstance(value, int if wanted is int else (int, float)):
-        raise ConfigError(f"{where} is {value!r}; it must be a {'whole number' if wanted is int else 'number'}")
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ConfigError(f"{where} is {value!r}; it must be finite")
-    above, least, most = (limits[key] for key in ("above", "least", "most"))
-    broken = (
-        (above is not None and value <= above, f"greater than {above}"),
-        (least is not None and value < least, f"at least {least}"),
-        (most is not None and value > most, f"at most {most}"),
-    )
-    for is_broken, allowed in broken:
-        if is_broken:
-            raise ConfigError(f"{where} is {value!r}; it must be {allowed}")
-    return wanted(value)  # type: ignore[no-any-return]  # int or float
 
 
 def _check_together(config: TableConfig, source: str) -> None:

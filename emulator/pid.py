@@ -8,8 +8,9 @@ see `fixed_point`.
 
 from typing import NamedTuple
 
-from emulator.config import ConfigError, GainsConfig, TableConfig
+from emulator.config import GainsConfig, TableConfig
 from emulator.fixed_point import ERROR_BITS, INTEGRAL_GAIN_BITS, OUTPUT_BITS, clamp, gain_registers
+from emulator.toml_section import ConfigError
 
 RAMP = 0
 HOLD = 1

@@ -8,7 +8,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from emulator.config import ConfigError, load_config
+from emulator.config import load_config
+from emulator.toml_section import ConfigError
 from protocol.client import TableClient
 from protocol.errors import TableError
 from tools.html_report import write_whole

@@ -10,7 +10,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from emulator.config import ConfigError, load_config
+from emulator.config import load_config
+from emulator.toml_section import ConfigError
 from tools.html_report import write_whole
 from tools.progress import Progress
 from tools.tuning.bounds import Limits

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from emulator.config import DEFAULT_FILE, ConfigError, TableConfig, load_config
+from emulator.config import DEFAULT_FILE, TableConfig, load_config
 from emulator.table import Table
+from emulator.toml_section import ConfigError
 
 DEFAULTS = tomllib.loads(DEFAULT_FILE.read_text(encoding="utf-8"))
 

@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
-from emulator.config import ConfigError, load_config
+from emulator.config import load_config
 from emulator.control import COMMANDS
 from emulator.faults import KINDS, FaultError, fault_from, parameters_of
+from emulator.toml_section import ConfigError
 
 EXAMPLE: dict[str, dict[str, float]] = {
     "drop": {"probability": 0.3},

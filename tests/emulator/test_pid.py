@@ -7,9 +7,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from emulator.config import ConfigError, GainsConfig, load_config
+from emulator.config import GainsConfig, load_config
 from emulator.fixed_point import ERROR_BITS, INT32_MAX, OUTPUT_BITS
 from emulator.pid import HOLD, RAMP, Gains, Pid, PidState, fixed_gains, pid, step
+from emulator.toml_section import ConfigError
 
 DEFAULT = load_config()
 COUNT = 1 << ERROR_BITS  # one count/window of demand
