@@ -40,11 +40,12 @@ def main(arguments: list[str] | None = None) -> int:
 def _record(options: argparse.Namespace) -> int:
     if options.duration < LEAST_DURATION_S:
         raise RecordingError(f"--duration is {options.duration:g}; it must be at least {LEAST_DURATION_S:g} s")
-    if options.speed <= 0.0 or options.acceleration <= 0.0:
-        raise RecordingError("--speed and --acceleration must be greater than 0")
-    turns = excitation(options.duration, options.speed, options.acceleration, options.seed)
+    for name in ("speed", "acceleration"):
+        if getattr(options, name) < 1.0:
+            raise RecordingError(f"--{name} is {getattr(options, name):g}; it must be at least 1")
+    bursts = excitation(options.duration, options.speed, options.acceleration, options.seed)
     with TableClient.open(options.port, baud=options.baud) as client, Progress("recording") as progress:
-        recording = record(client, turns, options.speed, options.baud, progress.show)
+        recording = record(client, bursts, options.speed, options.baud, progress.show)
     write_recording(options.out, recording)
     print(f"{options.out}: {len(recording.time_s)} readings, {len(recording.commands)} commands")
     return 0
@@ -58,7 +59,7 @@ def _fit(options: argparse.Namespace) -> int:
     except RecordingError as error:
         raise RecordingError(f"{options.recording}: {error}") from error
     with Progress("fitting") as progress:
-        found = identify(config, recording, options.seed, progress.show)
+        found = identify(config, recording, progress.show)
     print("\n".join(map(verdict, found.constants)))
     untold = [constant.name for constant in found.constants if constant.name in _NEEDED and not constant.told]
     if untold:
@@ -96,7 +97,6 @@ def _parser() -> argparse.ArgumentParser:
     fitter.add_argument(
         "--config", type=Path, help="what is known of the table: gains, encoder, datasheet (the default table)"
     )
-    fitter.add_argument("--seed", type=int, default=0, help="of the search")
     fitter.set_defaults(run=_fit)
     return parser
 

@@ -1,8 +1,8 @@
 """Estimation of the constants: the most likely ones, given what was taken for granted beforehand.
 
 Newton's method on the posterior, with Levenberg's damping. The answer of a table with dry friction and backlash is
-rugged in its constants, so the way is long: first with a coarse scale, from several backlashes, then finer, and from
-each peak a few draws from its surroundings are tried for a better one.
+rugged in its constants, so the way is long: first with a coarse scale, from several backlashes, then finer, and last
+along the ridges through each peak.
 """
 
 from collections.abc import Callable
@@ -17,8 +17,12 @@ Foretell = Callable[[Array], Array]
 """Returns the angles (deg) that the readings should tell, for a vector of constants."""
 
 _COARSE_SCALES_DEG = (2e-2, 8e-3)
-_SCALES_DEG = (3e-3, 1e-3, 3e-4)
-_DRAWS = 40
+_SCALES_DEG = (3e-3, 1e-3, 3e-4, 1e-4)
+_RIDGE_STEPS = (-1.5, -0.7, 0.7, 1.5)
+_CLIMBED_ON = 3
+
+_CONFIDENCE_SCALE_DEG = 1e-3
+"""The covariance sees the readings no sharper than so: closer by, what it would tell of is one of many narrow peaks."""
 
 
 class Prior(NamedTuple):
@@ -39,12 +43,16 @@ class Estimate(NamedTuple):
 
 
 class Posterior(NamedTuple):
-    """The problem: readings, model and prior; `steps` are the differences by which derivatives are taken."""
+    """The problem: readings, model and prior.
+
+    `steps` are the differences by which derivatives are taken, `assumed` the components that readings hardly tell.
+    """
 
     readings: Intervals
     foretell: Foretell
     prior: Prior
     steps: Array
+    assumed: tuple[int, ...]
 
     def height(self, vector: Array, foretold_deg: Array, scale_deg: float) -> float:
         """Return the logarithm of the posterior."""
@@ -67,12 +75,9 @@ class Posterior(NamedTuple):
         return result
 
 
-def estimate(
-    posterior: Posterior, starts: list[Array], seed: int, progress: Callable[[float], None] = lambda _: None
-) -> Estimate:
-    """Return the highest peak found from the starts; the same seed gives the same one."""
-    chance = np.random.default_rng(seed)
-    rounds = len(starts) + len(_SCALES_DEG)
+def estimate(posterior: Posterior, starts: list[Array], progress: Callable[[float], None] = lambda _: None) -> Estimate:
+    """Return the highest peak found from the starts."""
+    rounds = len(starts) + 3 * len(_SCALES_DEG)
     climbed = []
     for index, start in enumerate(starts):
         peak = _climb(posterior, start, _COARSE_SCALES_DEG[0], stride=4.0, rounds=4)
@@ -84,25 +89,29 @@ def estimate(
     for index, least_deg in enumerate(_SCALES_DEG):
         for stride in (4.0, 2.0, 1.0):
             best = _climb(posterior, best.vector, least_deg, stride, rounds=5)
-        best = _better_nearby(posterior, best, least_deg, chance)
-        progress((len(starts) + index + 1) / rounds)
+        if least_deg < _CONFIDENCE_SCALE_DEG:
+            best = _along_ridges(posterior, best, least_deg)
+        progress((len(starts) + 3 * (index + 1)) / rounds)
     return _with_covariance(posterior, best)
 
 
-def _better_nearby(posterior: Posterior, peak: Estimate, least_deg: float, chance: np.random.Generator) -> Estimate:
-    """Return a higher peak near to this one, or this one."""
-    spread = np.linalg.cholesky(_with_covariance(posterior, peak).covariance)
-    draws = peak.vector + chance.standard_normal((_DRAWS, len(peak.vector))) @ spread.T
+def _along_ridges(posterior: Posterior, peak: Estimate, least_deg: float) -> Estimate:
+    """Return a higher peak on the ridges through this one, or this one.
 
-    def height(vector: Array) -> float:
-        foretold = posterior.foretell(vector)
-        return posterior.height(vector, foretold, posterior.readings.best_scale_deg(foretold, least_deg))
-
-    start = max(draws, key=height)
+    Where one of the assumed constants is another, the readings can be explained nearly as well by other values of the
+    rest: these lie on a ridge, and its peaks are narrow.
+    """
+    covariance = _with_covariance(posterior, peak).covariance
+    begins = [
+        peak.vector + step * posterior.prior.deviation[index] * covariance[index] / covariance[index, index]
+        for index in posterior.assumed
+        for step in _RIDGE_STEPS
+    ]
+    tried = [_climb(posterior, begin, least_deg, 2.0, rounds=2) for begin in begins]
+    best = sorted(tried, key=lambda each: each.log_posterior)[-_CLIMBED_ON:]
     for stride in (2.0, 1.0):
-        start = _climb(posterior, start, least_deg, stride, rounds=5).vector
-    other = _climb(posterior, start, least_deg, 1.0, rounds=1)
-    return max(peak, other, key=lambda each: each.log_posterior)
+        best = [_climb(posterior, each.vector, least_deg, stride, rounds=5) for each in best]
+    return max(peak, *best, key=lambda each: each.log_posterior)
 
 
 def _climb(posterior: Posterior, start: Array, least_deg: float, stride: float, rounds: int) -> Estimate:
@@ -136,5 +145,5 @@ def _climb(posterior: Posterior, start: Array, least_deg: float, stride: float, 
 def _with_covariance(posterior: Posterior, peak: Estimate) -> Estimate:
     """Return the peak with the covariance about it; long differences see past the ruggedness."""
     jacobian = posterior.jacobian(peak.vector, 8.0)
-    information = posterior.information(jacobian, peak.foretold_deg, peak.scale_deg)
+    information = posterior.information(jacobian, peak.foretold_deg, max(peak.scale_deg, _CONFIDENCE_SCALE_DEG))
     return peak._replace(covariance=np.linalg.inv(information).astype(np.float64))

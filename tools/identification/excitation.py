@@ -6,26 +6,74 @@
 | slow swings | Coulomb friction and stiction: the lag jumps with the direction |
 | quick swings | inertia, and backlash: the teeth part, and meet again |
 
-A swing speeds up one way, then the other, and never holds a speed, so one gain set alone is at work. Each motion is
-replaced by the next before it ends, so the regulator's integral is never reset: then the lag is the integral of the
-speed error, and tells the duty. (A change of the gain set would keep the duty, and so forget a little of the lag.) No
-swing is narrower than a degree: within a wider gap the table would float, and no one could tell where.
+A burst is a row of swings to and fro about home, from rest to rest. A swing never reaches the top speed: it speeds up
+over half its way and brakes over the other, so one gain set alone is at work. Amid the braking the next target is sent,
+on the other side: the table brakes on as it would have, and turns. So the time of that command changes nothing; the
+firmware alone times a burst, from its first command on. At the end of a burst the table comes to rest, and the
+regulator forgets its integral: what the lag was before does not add to what it is afterwards.
+
+The turning points are a degree apart at least: within a wider gap the table would float, and no one could tell where.
 """
 
+from math import copysign, floor, sqrt
 from random import Random
 from typing import NamedTuple
 
+REST_S = 0.5
+"""For how long the table has time to settle after a burst."""
 
-class Turn(NamedTuple):
-    """Speed up in one direction, for a time."""
+_MOTION_S = 3.5
+"""About how long the motion of a burst is: with many in a recording, errors of the first commands' times cancel."""
 
-    duration_s: float
-    direction: int
+_LEAST_WIDTH_DEG = 1.0
+_BRAKING = 0.75
+"""When the next target is sent, as a share of a swing's duration: in the middle of the braking."""
+
+
+class Move(NamedTuple):
+    """A swing, and when its target is sent. Times count from the burst's first command, angles from home."""
+
+    send_s: float
+    begin_s: float
+    from_deg: float
+    to_deg: float
+
+
+class Reference(NamedTuple):
+    """The profile at an instant."""
+
+    angle_deg: float  # from home
+    speed_deg_s: float
     acceleration_deg_s2: float
 
 
+class Burst(NamedTuple):
+    """Swings about home with one acceleration."""
+
+    acceleration_deg_s2: float
+    moves: tuple[Move, ...]
+    end_s: float  # of the motion
+
+    @property
+    def duration_s(self) -> float:
+        """With the rest."""
+        return self.end_s + REST_S
+
+    def reference(self, time_s: float) -> Reference:
+        """Return the profile at a time after the first command."""
+        if not 0.0 < time_s < self.end_s:
+            return Reference(0.0, 0.0, 0.0)
+        move = next(move for move in reversed(self.moves) if move.begin_s <= time_s)
+        way_deg = abs(move.to_deg - move.from_deg)
+        acceleration = copysign(self.acceleration_deg_s2, move.to_deg - move.from_deg)
+        since_s, left_s = time_s - move.begin_s, move.begin_s + _swing_s(way_deg, self.acceleration_deg_s2) - time_s
+        if since_s < left_s:
+            return Reference(move.from_deg + acceleration * since_s**2 / 2.0, acceleration * since_s, acceleration)
+        return Reference(move.to_deg - acceleration * left_s**2 / 2.0, acceleration * left_s, -acceleration)
+
+
 class Swing(NamedTuple):
-    """A part of the excitation, in shares of the greatest duration, speed and acceleration."""
+    """A part of the excitation, in shares of the whole duration and of the greatest speed and acceleration."""
 
     duration: float
     speed: float
@@ -33,31 +81,51 @@ class Swing(NamedTuple):
 
 
 SWINGS = (
-    Swing(0.15, 0.9, 0.2),
-    Swing(0.2, 0.1, 0.02),
-    Swing(0.12, 0.025, 0.005),
-    Swing(0.27, 0.5, 1.0),
-    Swing(0.26, 0.3, 1.0),
+    Swing(0.11, 0.9, 0.4),
+    Swing(0.08, 0.1, 0.05),
+    Swing(0.09, 0.025, 0.01),
+    Swing(0.36, 0.35, 1.0),
+    Swing(0.36, 0.7, 1.0),
 )
 
 
-def excitation(duration_s: float, speed_deg_s: float, acceleration_deg_s2: float, seed: int) -> list[Turn]:
-    """Return the turns of a recording.
+def excitation(duration_s: float, speed_deg_s: float, acceleration_deg_s2: float, seed: int) -> list[Burst]:
+    """Return the bursts of a recording.
 
     Args:
         duration_s: How long it lasts, about.
         speed_deg_s: The greatest speed that may be used.
         acceleration_deg_s2: The greatest acceleration that may be used.
-        seed: Of the irregular durations, which keep the readings from falling on the same angles again and again.
+        seed: Of the irregular widths, which keep the readings from falling on the same angles again and again.
     """
     chance = Random(seed)  # noqa: S311  # spreads the readings
-    turns = []
+    bursts: list[Burst] = []
+    left_s = 0.0
     for swing in SWINGS:
-        acceleration = max(0.1, swing.acceleration * acceleration_deg_s2)
-        longest_s = swing.speed * speed_deg_s / acceleration
-        pairs = max(1, round(swing.duration * duration_s / (4.0 * 0.9 * longest_s)))
-        for _ in range(pairs):
-            quarter_s = longest_s * chance.uniform(0.8, 1.0)
-            for share, direction in ((1.0, 1), (2.0, -1), (1.0, 1)):
-                turns.append(Turn(share * quarter_s, direction, acceleration))
-    return turns
+        left_s += swing.duration * duration_s
+        burst = _burst(swing, speed_deg_s, acceleration_deg_s2, chance)
+        while left_s >= burst.duration_s / 2.0:
+            bursts.append(burst)
+            left_s -= burst.duration_s
+            burst = _burst(swing, speed_deg_s, acceleration_deg_s2, chance)
+    return bursts
+
+
+def _burst(swing: Swing, most_deg_s: float, most_deg_s2: float, chance: Random) -> Burst:
+    speed_deg_s = swing.speed * most_deg_s * chance.uniform(0.8, 1.0)
+    acceleration = max(
+        0.1, floor(10.0 * min(swing.acceleration * most_deg_s2, speed_deg_s**2 / _LEAST_WIDTH_DEG)) / 10.0
+    )
+    reach_deg = max(round(speed_deg_s**2 / acceleration / 2.0, 1), 0.1)
+    pairs = max(1, round(_MOTION_S / (2.0 * _swing_s(2.0 * reach_deg, acceleration))))
+    moves, send_s, begin_s, from_deg = [], 0.0, 0.0, 0.0
+    for to_deg in (reach_deg, *[-reach_deg, reach_deg] * (pairs - 1), -reach_deg, 0.0):
+        moves.append(Move(send_s, begin_s, from_deg, to_deg))
+        swing_s = _swing_s(abs(to_deg - from_deg), acceleration)
+        send_s, begin_s, from_deg = begin_s + _BRAKING * swing_s, begin_s + swing_s, to_deg
+    return Burst(acceleration, tuple(moves), begin_s)
+
+
+def _swing_s(way_deg: float, acceleration_deg_s2: float) -> float:
+    """Return how long it takes to speed up over half the way, and to brake over the other."""
+    return 2.0 * sqrt(way_deg / acceleration_deg_s2)

@@ -4,10 +4,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from emulator.config import TableConfig
-from tools.emulated import Array
 from tools.html_report import BLUE, ORANGE, figure_block, heading, new_figure, page, paragraph, svg_of, table_block
 from tools.identification.identify_table import Constant, Identified
 from tools.identification.parameters import PARAMETERS
+
+_GAP_S = 0.5
+"""Readings farther apart are not joined by a line."""
 
 
 def verdict(constant: Constant) -> str:
@@ -33,7 +35,7 @@ def fit_report(found: Identified, assumed: TableConfig, source: str) -> str:
             f"{constant.name}, {constant.unit}",
             f"{constant.value:.4g}",
             f"{constant.low:.4g} .. {constant.high:.4g}",
-            "+told" if constant.told else "!not told",
+            "+told" if constant.told else "not told",
         )
         for constant in found.constants
     ]
@@ -41,12 +43,12 @@ def fit_report(found: Identified, assumed: TableConfig, source: str) -> str:
     return page(
         "Identified table",
         [
-            paragraph(f"From {source}: {len(found.time_s)} readings over {found.time_s[-1]:.1f} s.", "lead"),
+            paragraph(f"From {source}: {len(found.time_s)} readings used, over {found.time_s[-1]:.1f} s.", "lead"),
             paragraph(
                 f"The recording does not tell: {', '.join(untold)}. Their values are mostly what was assumed."
                 if untold
                 else "The recording tells every constant.",
-                "bad" if untold else "good",
+                "" if untold else "good",
             ),
             heading("Constants, with 95 % confidence intervals"),
             table_block(("constant", "estimate", "interval", ""), rows),
@@ -57,7 +59,10 @@ def fit_report(found: Identified, assumed: TableConfig, source: str) -> str:
                 "quiet",
             ),
             heading("The fit"),
-            figure_block(svg_of(_fit_figure(found)), "Recorded and foretold, and what is left between them."),
+            figure_block(
+                svg_of(_fit_figure(found)),
+                "Recorded and foretold, and how far the foretold angles are outside what the readings tell.",
+            ),
         ],
     )
 
@@ -66,14 +71,19 @@ def _fit_figure(found: Identified) -> Figure:
     figure = new_figure(10.5, 5.2, rows=2)
     top, bottom = figure.axes
     time_s, seen_deg, foretold_deg = found.time_s, found.seen_deg, found.foretold_deg
+    after_gap = np.diff(time_s, prepend=time_s[0]) > _GAP_S
+    seen_deg, foretold_deg = (np.where(after_gap, np.nan, angle_deg) for angle_deg in (seen_deg, foretold_deg))
     top.plot(time_s, seen_deg, color=ORANGE, linewidth=2.4, label="recorded")
     top.plot(time_s, foretold_deg, color=BLUE, linewidth=1.0, label="foretold")
     top.set_title("Compared")
     top.set_ylabel("deg")
     top.legend(loc="upper right")
-    rest: Array = seen_deg - foretold_deg
-    bottom.plot(time_s, rest, ".", markersize=1.6, color=BLUE)
-    bottom.set_title(f"Recorded less foretold: rms {float(np.sqrt(np.mean(rest**2))):.4f} deg (rounding included)")
+    left = found.unexplained_deg
+    bottom.plot(time_s, left, ".", markersize=2.5, color=BLUE)
+    rms_deg = float(np.sqrt(np.mean(left**2)))
+    bottom.set_title(
+        f"What rounding does not explain: {np.count_nonzero(left)} of {len(left)} readings, rms {rms_deg:.2g} deg"
+    )
     bottom.set_ylabel("deg")
     bottom.set_xlabel("time, s")
     return figure

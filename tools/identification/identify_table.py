@@ -6,25 +6,29 @@ from math import exp, log
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from emulator.config import TableConfig
 from tools.emulated import Array
 from tools.identification.estimation import Estimate, Posterior, Prior, estimate
 from tools.identification.likelihood import Intervals
-from tools.identification.parameters import BACKLASH, PARAMETERS, with_logarithms
+from tools.identification.parameters import ASSUMED, BACKLASH, PARAMETERS, with_logarithms
 from tools.identification.recording import DriveRecording, WireRecording
 from tools.identification.simulation import (
     commanded_motions,
     drive_positions_deg,
+    from_rest,
     ticks_of,
     wire_positions_deg,
 )
+from tools.identification.timing import Timing, timing
 from tools.tuning.linear_model import Teeth, load_ratio, speed_gain_deg_s, time_constant_s
 
 _BACKLASH_STARTS_ARCMIN = (1.5, 3.0, 6.0, 12.0, 22.0, 36.0, 56.0)
 _SURE_95 = 1.96
 _TOLD_SHARE = 0.5
-"""A constant is told by a recording that at least halves what was uncertain of it."""
+_TOLD_DEVIATION = 0.25
+"""A constant is told by a recording that at least halves what was uncertain of it, and to a quarter of its value."""
 
 _WIRE_DELAY_S = 1e-4
 """How well the times of commands and readings agree: the line delays both alike."""
@@ -59,6 +63,7 @@ class Identified(NamedTuple):
     time_s: Array  # of what was compared
     seen_deg: Array
     foretold_deg: Array
+    unexplained_deg: Array  # how far the foretold angles are outside what the readings tell
 
 
 _Derived = Callable[[TableConfig], float]
@@ -90,7 +95,6 @@ DERIVED: tuple[tuple[str, str, _Derived], ...] = (
 def identify(
     config: TableConfig,
     recording: WireRecording | DriveRecording,
-    seed: int = 0,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Identified:
     """Return the constants of the table that was recorded.
@@ -98,7 +102,6 @@ def identify(
     Args:
         config: What is known beforehand: the controller and its gains, the encoder, the datasheet.
         recording: A recording that `recording_checks` let pass.
-        seed: Of the search.
         progress: Called with the share that is done.
     """
     if isinstance(recording, WireRecording):
@@ -110,7 +113,7 @@ def identify(
         start = posterior.prior.mean.copy()
         start[BACKLASH] = log(arcmin)
         starts.append(start)
-    found = estimate(posterior, starts, seed, progress)
+    found = estimate(posterior, starts, progress)
     return Identified(
         with_logarithms(config, found.vector[: len(PARAMETERS)]),
         _constants(config, posterior, found, isinstance(recording, DriveRecording)),
@@ -118,6 +121,7 @@ def identify(
         time_s,
         seen_deg,
         found.foretold_deg,
+        posterior.readings.outside_deg(found.foretold_deg),
     )
 
 
@@ -129,21 +133,18 @@ def _prior(config: TableConfig, mean: Sequence[float], deviation: Sequence[float
 
 
 def _wire_problem(config: TableConfig, recording: WireRecording) -> tuple[Array, Array, Posterior]:
-    motions = commanded_motions(config, recording)
-    count_deg = config.counts_per_turn / 360.0
-    seen_deg = recording.position_deg - recording.position_deg[0]
-    half = recording.resolution_deg / 2.0
-    # A reply is a rounded count: it tells between which two counts the encoder stood.
-    low = np.ceil((seen_deg - half) * count_deg - 1e-6) / count_deg
-    high = (np.floor((seen_deg + half) * count_deg + 1e-6) + 1.0) / count_deg
-
-    drift = _drift(recording.time_s)
+    at, tick_hz = timing(config, recording), config.control.tick_hz
+    motions = commanded_motions(config, recording, at.commands)
+    kept = _trusted(config, recording, at, motions)
+    time_s, ticks = recording.time_s[kept], at.readings[kept]
+    seen_deg = (recording.position_deg - recording.position_deg[0])[kept]
+    drift = _drift(time_s)
     size = len(PARAMETERS)
 
     @lru_cache(maxsize=4)
     def turned_deg(constants: tuple[float, ...]) -> Array:
         *logarithms, delay_s = constants
-        return wire_positions_deg(with_logarithms(config, logarithms), recording, motions, delay_s)
+        return wire_positions_deg(with_logarithms(config, logarithms), motions, ticks - delay_s * tick_hz)
 
     def foretell(vector: Array) -> Array:
         return turned_deg(tuple(vector[: size + 1])) + drift @ vector[size + 1 :]
@@ -151,7 +152,26 @@ def _wire_problem(config: TableConfig, recording: WireRecording) -> tuple[Array,
     knots = drift.shape[1]
     prior = _prior(config, [0.0] * (1 + knots), [_WIRE_DELAY_S, *[_START_DEG] * knots])
     steps = np.array([*(parameter.step for parameter in PARAMETERS), 2e-4, *[1e-3] * knots])
-    return recording.time_s, seen_deg, Posterior(Intervals(low, high), foretell, prior, steps)
+    return time_s, seen_deg, Posterior(_intervals(config, recording, seen_deg), foretell, prior, steps, ASSUMED)
+
+
+def _intervals(config: TableConfig, recording: WireRecording, seen_deg: Array) -> Intervals:
+    """Return what replies tell: a reply is a rounded count, so the encoder stood between two counts."""
+    count_deg, half = config.counts_per_turn / 360.0, recording.resolution_deg / 2.0
+    low = np.ceil((seen_deg - half) * count_deg - 1e-6) / count_deg
+    high = (np.floor((seen_deg + half) * count_deg + 1e-6) + 1.0) / count_deg
+    return Intervals(low, high)
+
+
+def _trusted(
+    config: TableConfig, recording: WireRecording, at: Timing, motions: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Tell which readings are to be trusted: their own times, and when the table set off from its last rest."""
+    doubtful = at.doubtful_commands[[sent.verb in "PR" for sent in recording.commands]]
+    sets_off = from_rest(config, motions)
+    last = np.searchsorted(motions[sets_off, 0], at.readings, side="right") - 1
+    astray = (last >= 0) & doubtful[sets_off][last]
+    return ~(at.doubtful_readings | astray)
 
 
 def _drift(time_s: Array) -> Array:
@@ -177,7 +197,11 @@ def _drive_problem(config: TableConfig, recording: DriveRecording) -> tuple[Arra
     prior = _prior(config, [1.0], [1.0])
     steps = np.array([*(parameter.step for parameter in PARAMETERS), 0.1])
     time_s = np.arange(1, len(seen_deg) + 1) * window / tick_hz
-    return time_s, seen_deg, Posterior(Intervals(seen_deg - count_deg, seen_deg + count_deg), foretell, prior, steps)
+    return (
+        time_s,
+        seen_deg,
+        Posterior(Intervals(seen_deg - count_deg, seen_deg + count_deg), foretell, prior, steps, ASSUMED),
+    )
 
 
 def _constants(config: TableConfig, posterior: Posterior, found: Estimate, from_drive: bool) -> tuple[Constant, ...]:
@@ -190,8 +214,9 @@ def _constants(config: TableConfig, posterior: Posterior, found: Estimate, from_
         slope[:size] = _log_slope(config, found.vector[:size], function)
         after, prior = (float(np.sqrt(slope @ spread @ slope)) for spread in (found.covariance, before))
         value = function(with_logarithms(config, found.vector[:size]))
+        told = after < min(_TOLD_SHARE * prior, _TOLD_DEVIATION)
         factor = exp(min(_SURE_95 * after, 50.0))
-        result.append(Constant(name, unit, value, value / factor, value * factor, after < _TOLD_SHARE * prior))
+        result.append(Constant(name, unit, value, value / factor, value * factor, told))
     deviation = float(np.sqrt(found.covariance[size, size]))
     delay, unit = found.vector[size], "ticks, duty to bridge" if from_drive else "ms, reading behind command"
     scale = 1.0 if from_drive else 1e3

@@ -42,5 +42,9 @@ class Intervals(NamedTuple):
         scales = least_deg * np.geomspace(1.0, 1000.0, 31)
         return float(max(scales, key=lambda scale_deg: self.log_likelihood(angle_deg, scale_deg)))
 
+    def outside_deg(self, angle_deg: Array) -> Array:
+        """Return how far angles are above (or, negative, below) the intervals."""
+        return angle_deg - np.clip(angle_deg, self.low_deg, self.high_deg)
+
     def _at_ends(self, angle_deg: Array, scale_deg: float) -> tuple[Array, Array]:
         return expit((self.low_deg - angle_deg) / scale_deg), expit((self.high_deg - angle_deg) / scale_deg)

@@ -44,11 +44,14 @@ PARAMETERS = (
     Parameter("gears", "backlash_arcmin", 1.5, least=0.05),
     Parameter("friction", "stiction_ratio", 0.15, least=1.0),
     Parameter("friction", "stribeck_speed_rad_s", 0.3, step=0.05),
-    Parameter("motor", "rotor_inertia_kg_m2", 0.2),
+    Parameter("motor", "rotor_inertia_kg_m2", 0.12),
     Parameter("gears", "efficiency", 0.1, most=1.0),
     Parameter("table", "bearing_friction_Nm", 0.3, least=1e-4),
-    Parameter("friction", "viscous_Nm_s", 1.0, least=1e-9, step=0.1),
+    Parameter("friction", "viscous_Nm_s", 0.7, least=1e-9, step=0.1),
 )
+
+ASSUMED = (4, 5, 6, 7, 8, 9)
+"""The places of those that are mostly taken for granted."""
 
 BACKLASH = 3
 """The backlash's place: the one constant from several values of which the search begins."""

@@ -7,25 +7,27 @@ import numpy as np
 
 from protocol.client import TableClient
 from protocol.errors import TableError
-from tools.identification.excitation import Turn
-from tools.identification.recording import Sent, WireRecording
+from tools.identification.excitation import Burst
+from tools.identification.lag_tracker import LagTracker, next_passage_s
+from tools.identification.recording import BITS_A_BYTE, Sent, WireRecording
 
-_BITS_A_BYTE = 10
+_STEP_DEG = 0.1
+_LONGEST_WAIT_S = 0.016
 
 
 def record(
     client: TableClient,
-    turns: list[Turn],
+    bursts: list[Burst],
     speed_deg_s: float,
     baud: int,
     progress: Callable[[float], None] = lambda _: None,
 ) -> WireRecording:
-    """Return what the table answers while it makes the turns; it is brought back to its start afterwards.
+    """Return what the table answers while it makes the bursts; it ends where it began.
 
     Args:
         client: A client that no one else uses, sending one decimal.
-        turns: From `excitation`.
-        speed_deg_s: The top speed, which no turn reaches.
+        bursts: From `excitation`.
+        speed_deg_s: The top speed, which no swing reaches.
         baud: Of the line: a command counts from when it is complete at the table.
         progress: Called with the share that is done.
 
@@ -35,20 +37,14 @@ def record(
     home_deg = round(client.position_deg(), 1)
     client.move_to(home_deg)
     client.wait_until_at(home_deg)
-    recorder = _Recorder(client, baud)
-    reach_deg = 2.0 * max(turn.acceleration_deg_s2 * turn.duration_s**2 for turn in turns)
-    length_s = sum(turn.duration_s for turn in turns)
+    recorder = _Recorder(client, baud, home_deg)
+    length_s = sum(burst.duration_s for burst in bursts)
     try:
-        end_s = 0.0
-        for turn in turns:
-            end_s += turn.duration_s
-            recorder.send("S", speed_deg_s)
-            recorder.send("A", turn.acceleration_deg_s2)
-            recorder.send("P", home_deg + turn.direction * reach_deg)
-            while recorder.now_s() < end_s:
-                recorder.read()
-            progress(min(end_s / length_s, 1.0))
-        client.move_to(home_deg)
+        recorder.send("S", speed_deg_s)
+        recorder.read()
+        for burst in bursts:
+            recorder.run(burst)
+            progress(min(recorder.now_s() / length_s, 1.0))
     except BaseException:
         with suppress(TableError):
             client.stop()
@@ -58,34 +54,71 @@ def record(
 
 
 class _Recorder:
-    """Notes what is said, and when each line was complete at the table."""
+    """Notes what is said, when each line was complete at the table, and when its reply was here."""
 
-    def __init__(self, client: TableClient, baud: int) -> None:
+    def __init__(self, client: TableClient, baud: int, home_deg: float) -> None:
         self._client = client
-        self._byte_s = _BITS_A_BYTE / baud if baud else 0.0
+        self._home_deg = home_deg
+        self._byte_s = BITS_A_BYTE / baud if baud else 0.0
         self._start_s = client.clock.now_s()
+        self._lag = LagTracker()
         self._commands: list[Sent] = []
         self._times_s: list[float] = []
         self._positions_deg: list[float] = []
-        self._last_values: dict[str, float] = {}
+        self._replies_s: list[float] = []
 
     def now_s(self) -> float:
         return self._client.clock.now_s() - self._start_s
 
-    def send(self, verb: str, value: float) -> None:
-        """Send a command; S and A only when their value is a new one."""
-        value = round(value, 1)
-        if verb != "P" and self._last_values.get(verb) == value:
-            return
-        self._last_values[verb] = value
-        time_s = self.now_s() + self._byte_s * len(f"{verb} {value:.1f}\r")
-        {"S": self._client.set_speed, "A": self._client.set_acceleration, "P": self._client.move_to}[verb](value)
-        self._commands.append(Sent(time_s, verb, value))
+    def run(self, burst: Burst) -> None:
+        """Send the burst's commands, and poll until it is over and the table rests."""
+        self.send("A", burst.acceleration_deg_s2)
+        first, *others = burst.moves
+        begin_s = self.send("P", self._home_deg + first.to_deg)
+        for move in others:
+            self._poll(burst, begin_s, begin_s + move.send_s)
+            self.send("P", self._home_deg + move.to_deg)
+        self._poll(burst, begin_s, begin_s + burst.duration_s)
 
-    def read(self) -> None:
-        time_s = self.now_s() + self._byte_s * len("H\r")
-        self._positions_deg.append(self._client.position_deg())
+    def send(self, verb: str, value: float) -> float:
+        """Send a command, and return when it was complete at the table."""
+        value = round(value, 1)
+        time_s = self.now_s() + self._line_s(f"{verb} {value:.1f}\r")
+        {"S": self._client.set_speed, "A": self._client.set_acceleration, "P": self._client.move_to}[verb](value)
+        self._commands.append(Sent(time_s, verb, value, self.now_s()))
+        return time_s
+
+    def read(self) -> tuple[float, float]:
+        """Ask for the position; return it, and when the question was complete at the table."""
+        time_s = self.now_s() + self._line_s("H\r")
+        position_deg = self._client.position_deg()
         self._times_s.append(time_s)
+        self._positions_deg.append(position_deg)
+        self._replies_s.append(self.now_s())
+        return time_s, position_deg
 
     def recording(self) -> WireRecording:
-        return WireRecording(tuple(self._commands), np.array(self._times_s), np.array(self._positions_deg))
+        return WireRecording(
+            tuple(self._commands), np.array(self._times_s), np.array(self._positions_deg), np.array(self._replies_s)
+        )
+
+    def _poll(self, burst: Burst, begin_s: float, end_s: float) -> None:
+        """Read when the table is about to pass from one decimal to the next: then a rounded reading tells most."""
+
+        def position_deg(time_s: float) -> float:
+            reference = burst.reference(time_s - begin_s)
+            return self._home_deg + reference.angle_deg - self._lag.lag_deg(reference)
+
+        line_s = self._line_s("H\r")
+        while (now_s := self.now_s()) < end_s:
+            soonest_s = now_s + line_s
+            wait_s = next_passage_s(position_deg, _STEP_DEG, soonest_s, _LONGEST_WAIT_S) - soonest_s
+            if wait_s > 0.0:
+                self._client.clock.sleep_s(wait_s)
+            time_s, seen_deg = self.read()
+            reference = burst.reference(time_s - begin_s)
+            lag_deg = self._home_deg + reference.angle_deg - seen_deg
+            self._lag.learn(reference, lag_deg - _STEP_DEG / 2.0, lag_deg + _STEP_DEG / 2.0)
+
+    def _line_s(self, line: str) -> float:
+        return self._byte_s * len(line)

@@ -5,12 +5,14 @@ Over the wire (`WireRecording`), a CSV file with the columns
     time_s        when the line was complete at the table, on the recorder's clock
     command       `P 30.0`, `R`, `S` and `A` likewise; `H` in the row of a reading
     position_deg  the answer to `H`, empty in the rows of the other commands
+    reply_s       when the reply was complete, on the same clock; may be missing
 
 From a drive (`DriveRecording`), or from the emulator's own trace, a CSV file that has among its columns `time_s`,
 `duty` (-1..1) and `position_deg` or `encoder_deg`.
 """
 
 import csv
+from math import nan
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,7 +20,11 @@ import numpy as np
 
 from tools.emulated import Array
 
+BITS_A_BYTE = 10
+"""On the line: a start bit, eight of data, a stop bit."""
+
 COLUMNS = ("time_s", "command", "position_deg")
+_REPLY = "reply_s"
 _MOST_DECIMALS = 6
 
 
@@ -32,6 +38,7 @@ class Sent(NamedTuple):
     time_s: float
     verb: str
     value: float
+    reply_s: float = nan  # when its reply was complete, if it is known
 
 
 class WireRecording(NamedTuple):
@@ -40,6 +47,7 @@ class WireRecording(NamedTuple):
     commands: tuple[Sent, ...]
     time_s: Array
     position_deg: Array
+    reply_s: Array  # when the replies were complete; NaN where it is not known
 
     @property
     def resolution_deg(self) -> float:
@@ -60,16 +68,16 @@ class DriveRecording(NamedTuple):
 
 def write_recording(path: Path, recording: WireRecording) -> None:
     """Write a recording; the file appears under its name when it is complete."""
-    rows = [(sent.time_s, f"{sent.verb} {sent.value}", "") for sent in recording.commands]
-    rows += [
-        (float(time_s), "H", str(angle)) for time_s, angle in zip(recording.time_s, recording.position_deg, strict=True)
-    ]
+    rows = [(sent.time_s, f"{sent.verb} {sent.value}", "", sent.reply_s) for sent in recording.commands]
+    readings = zip(recording.time_s, recording.position_deg, recording.reply_s, strict=True)
+    rows += [(float(time_s), "H", str(angle_deg), float(reply_s)) for time_s, angle_deg, reply_s in readings]
     partial = path.with_name(path.name + ".part")
     with partial.open("w", encoding="ascii", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
+        writer.writerow((*COLUMNS, _REPLY))
         writer.writerows(
-            (f"{time_s:.6f}", command, angle) for time_s, command, angle in sorted(rows, key=lambda row: row[0])
+            (f"{time_s:.6f}", command, angle, f"{reply_s:.6f}")
+            for time_s, command, angle, reply_s in sorted(rows, key=lambda row: row[0])
         )
     partial.replace(path)
 
@@ -100,18 +108,20 @@ def read_recording(path: Path) -> WireRecording | DriveRecording:
 
 
 def _wire(path: Path, rows: list[dict[str, str]]) -> WireRecording:
-    commands, times, positions = [], [], []
+    commands, times, positions, replies = [], [], [], []
     for line, row in enumerate(rows, start=2):
         verb, _, value = (row["command"] or "").partition(" ")
         if verb not in set("HPRSA"):
             raise RecordingError(f"{path}: line {line}: the command is {row['command']!r}; it must be H, P, R, S or A")
         time_s = _number(path, line, "time_s", row["time_s"])
+        reply_s = _number(path, line, _REPLY, row[_REPLY]) if _REPLY in row else nan
         if verb == "H":
             times.append(time_s)
+            replies.append(reply_s)
             positions.append(_number(path, line, "position_deg", row["position_deg"]))
         else:
-            commands.append(Sent(time_s, verb, _number(path, line, "command", value)))
-    return WireRecording(tuple(commands), np.array(times), np.array(positions))
+            commands.append(Sent(time_s, verb, _number(path, line, "command", value), reply_s))
+    return WireRecording(tuple(commands), np.array(times), np.array(positions), np.array(replies))
 
 
 def _numbers(path: Path, rows: list[dict[str, str]], name: str) -> Array:

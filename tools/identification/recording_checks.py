@@ -6,6 +6,7 @@ from emulator.config import TableConfig
 from tools.emulated import Array
 from tools.identification.recording import DriveRecording, RecordingError, WireRecording
 from tools.identification.simulation import commanded_motions, ticks_of, wire_positions_deg
+from tools.identification.timing import timing
 
 LEAST_DURATION_S = 10.0
 LEAST_READINGS = 300
@@ -77,20 +78,20 @@ def _check_speeds(config: TableConfig, time_s: Array, position_deg: Array) -> No
 
 def _check_against_commands(config: TableConfig, recording: WireRecording) -> None:
     _check_gaps(recording.time_s)
-    motions = commanded_motions(config, recording)
-    if not len(motions):
+    if not any(sent.verb in "PR" for sent in recording.commands):
         raise RecordingError(
             "the recording has no P or R command; the duty follows from the commands, so they are needed"
         )
-    foretold = wire_positions_deg(config, recording, motions, 0.0)
+    at = timing(config, recording)
+    foretold = wire_positions_deg(config, commanded_motions(config, recording, at.commands), at.readings)
     seen = recording.position_deg - recording.position_deg[0]
     _check_stall(recording.time_s, seen, foretold)
     ratio = float(np.ptp(seen) / max(np.ptp(foretold), 1e-9))
     stray = np.abs(seen - foretold)
     if stray.max() > _STRAY_DEG:
-        at = int(np.argmax(stray > _STRAY_DEG))
+        first = int(np.argmax(stray > _STRAY_DEG))
         raise RecordingError(
-            f"from {recording.time_s[at]:.2f} s on the table is not where its commands send it "
+            f"from {recording.time_s[first]:.2f} s on the table is not where its commands send it "
             f"(travel {ratio:.3g} times as far): wrong units, a step of the clock, lost commands, "
             "or other gears and encoder than configured"
         )

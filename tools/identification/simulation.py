@@ -19,50 +19,52 @@ from tools.emulated import Array, Motion, motion_rows, switched_on
 from tools.identification.recording import DriveRecording, WireRecording
 
 _ANGLE = COLUMNS.index("motor_angle_rad")
+_REFERENCE_SPEED = COLUMNS.index("reference_speed")
 _SEED = 0
 
 
-def commanded_motions(config: TableConfig, recording: WireRecording) -> NDArray[np.int64]:
-    """Return the motions of a recording as `emulator.batch` takes them, from the position of the first reading."""
-    tick_hz = config.control.tick_hz
+def commanded_motions(config: TableConfig, recording: WireRecording, ticks: Array) -> NDArray[np.int64]:
+    """Return the motions of a recording as `emulator.batch` takes them, from the position of the first reading.
+
+    Args:
+        config: The table.
+        recording: What was commanded.
+        ticks: (commands,) at whose end the commands were carried out.
+    """
     speed, acceleration = config.power_on.speed_deg_s, config.power_on.acceleration_deg_s2
     start_deg = recording.position_deg[0]
     motions = []
-    for time_s, verb, value in recording.commands:
+    for (_, verb, value, _), tick in zip(recording.commands, ticks, strict=True):
         if verb == "S":
             speed = value
         elif verb == "A":
             acceleration = value
         else:
             angle_deg = value if verb == "R" else value - start_deg
-            carried_out_s = (
-                ceil(time_s * tick_hz - 1e-3) / tick_hz
-            )  # at the end of the tick in which the line was complete
-            motions.append(Motion(carried_out_s, angle_deg, speed, acceleration, by=verb == "R"))
+            motions.append(Motion(tick / config.control.tick_hz, angle_deg, speed, acceleration, by=verb == "R"))
     return motion_rows(config, motions)
 
 
-def wire_positions_deg(
-    config: TableConfig, recording: WireRecording, motions: NDArray[np.int64], delay_s: float
-) -> Array:
-    """Return where the encoder would be at each reading, from the first reading on.
-
-    Args:
-        config: The table.
-        recording: Whose commands it is given.
-        motions: From `commanded_motions`.
-        delay_s: By how much a reading is older than its time says.
-    """
-    tick_hz = config.control.tick_hz
-    ticks = ceil(recording.time_s[-1] * tick_hz) + 2
-    constants, state = switched_on(config, _SEED)
-    _, samples = run(constants, state, ticks, motions)
-    angle = np.concatenate([[0.0], samples[:, _ANGLE]])
-    read = np.ceil(recording.time_s * tick_hz - 1e-3) - delay_s * tick_hz
-    tick = np.clip(np.floor(read).astype(np.int64), 0, ticks - 1)
-    share = read - tick
+def wire_positions_deg(config: TableConfig, motions: NDArray[np.int64], ticks: Array) -> Array:
+    """Return where the encoder would be at given ticks, which may have fractions, from where it was at the start."""
+    angle = _samples(config, motions, ceil(ticks.max()) + 2)[:, _ANGLE]
+    angle = np.concatenate([[0.0], angle])
+    tick = np.clip(np.floor(ticks).astype(np.int64), 0, len(angle) - 2)
+    share = ticks - tick
     turned = angle[tick] * (1.0 - share) + angle[tick + 1] * share
     return np.degrees(turned) / config.gears.ratio
+
+
+def from_rest(config: TableConfig, motions: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Tell which motions begin when the profile stands."""
+    speed = _samples(config, motions, int(motions[-1, 0]) + 1)[:, _REFERENCE_SPEED]
+    before: NDArray[np.bool_] = np.concatenate([[0.0], speed])[motions[:, 0]] == 0.0
+    return before
+
+
+def _samples(config: TableConfig, motions: NDArray[np.int64], ticks: int) -> Array:
+    constants, state = switched_on(config, _SEED)
+    return run(constants, state, ticks, motions)[1]
 
 
 def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) -> Array:

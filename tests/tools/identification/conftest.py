@@ -1,9 +1,12 @@
 from pathlib import Path
+from random import Random
 
 import pytest
+import serial
 
 import emulator  # noqa: F401  # teaches pyserial the port emulator://
 from emulator.config import TableConfig, load_config
+from emulator.protocol_emulator import Serial
 from protocol.client import TableClient
 from tools.identification.excitation import excitation
 from tools.identification.recorder import record
@@ -40,3 +43,44 @@ def recording(unseen: Path) -> WireRecording:
 def assumed() -> TableConfig:
     """What is known of it beforehand: the default table, and that is wrong by much."""
     return load_config()
+
+
+class UnhurriedPort:
+    """A port of a busy computer: what is written leaves late now and then, and what comes in is handed over late."""
+
+    def __init__(self, port: Serial, seed: int) -> None:
+        self._port = port
+        self._chance = Random(seed)  # noqa: S311  # jitter is no secret
+        self.clock = port.clock
+        self.timeout: float | None = 1.0
+
+    @property
+    def in_waiting(self) -> int:
+        return self._port.in_waiting
+
+    def read(self, size: int, /) -> bytes:
+        self._port.timeout = self.timeout
+        data = self._port.read(size)
+        if data.endswith(b"\r"):
+            self._dawdle()
+        return data
+
+    def write(self, data: bytes, /) -> int | None:
+        self._dawdle()
+        return self._port.write(data)
+
+    def close(self) -> None:
+        self._port.close()
+
+    def _dawdle(self) -> None:
+        if self._chance.random() < 0.04:
+            self._port.advance(1 + int(self._chance.expovariate(0.3)))
+
+
+@pytest.fixture(scope="session")
+def unhurried_recording(unseen: Path) -> WireRecording:
+    """A minute of that table recorded by a busy computer."""
+    port = serial.serial_for_url(f"emulator://?config={unseen}&seed=11", baudrate=9600)
+    assert isinstance(port, Serial)
+    with TableClient(UnhurriedPort(port, seed=4)) as client:
+        return record(client, excitation(60.0, 40.0, 100.0, seed=0), speed_deg_s=40.0, baud=9600)

@@ -19,10 +19,22 @@ def test_a_recording_comes_back_from_its_file(recording: WireRecording, tmp_path
     read = read_recording(path)
 
     assert isinstance(read, WireRecording)
-    assert [sent[1:] for sent in read.commands] == [sent[1:] for sent in recording.commands]
+    assert [sent[1:3] for sent in read.commands] == [sent[1:3] for sent in recording.commands]
     np.testing.assert_allclose(read.time_s, recording.time_s, atol=1e-6)
     assert read.position_deg.tolist() == recording.position_deg.tolist()
+    np.testing.assert_allclose(read.reply_s, recording.reply_s, atol=1e-6)
     assert read.resolution_deg == 0.1
+
+
+def test_a_recording_need_not_say_when_the_replies_came(tmp_path: Path) -> None:
+    path = tmp_path / "trace.csv"
+    path.write_text("time_s,command,position_deg\n0.0,P 10.0,\n0.1,H,0.0\n", encoding="ascii")
+
+    read = read_recording(path)
+
+    assert isinstance(read, WireRecording)
+    assert np.isnan(read.commands[0].reply_s)
+    assert np.isnan(read.reply_s).tolist() == [True]
 
 
 def test_a_drives_file_is_known_by_its_columns(tmp_path: Path) -> None:

@@ -2,30 +2,42 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from emulator.config import TableConfig
+from tools.emulated import Array
 from tools.identification.recording import DriveRecording, RecordingError, WireRecording
 from tools.identification.recording_checks import check_recording
 
 Spoil = Callable[[WireRecording], WireRecording]
 
 
+def kept(recording: WireRecording, which: NDArray[np.bool_]) -> WireRecording:
+    return recording._replace(
+        time_s=recording.time_s[which],
+        position_deg=recording.position_deg[which],
+        reply_s=recording.reply_s[which],
+    )
+
+
+def later(recording: WireRecording, shift_s: Array) -> WireRecording:
+    return recording._replace(time_s=recording.time_s + shift_s, reply_s=recording.reply_s + shift_s)
+
+
 def too_short(recording: WireRecording) -> WireRecording:
-    return recording._replace(time_s=recording.time_s[:500], position_deg=recording.position_deg[:500])
+    return kept(recording, np.arange(len(recording.time_s)) < 500)
 
 
 def with_a_gap(recording: WireRecording) -> WireRecording:
-    kept = (recording.time_s < 20.0) | (recording.time_s > 21.0)
-    return recording._replace(time_s=recording.time_s[kept], position_deg=recording.position_deg[kept])
+    return kept(recording, (recording.time_s < 20.0) | (recording.time_s > 21.0))
 
 
 def with_the_clock_set_back(recording: WireRecording) -> WireRecording:
-    return recording._replace(time_s=recording.time_s - 0.3 * (recording.time_s > 20.0))
+    return later(recording, np.where(recording.time_s > 20.0, -0.3, 0.0))
 
 
 def with_the_clock_set_forward(recording: WireRecording) -> WireRecording:
-    late = 0.4 * (recording.time_s > 2.0)
-    return recording._replace(time_s=recording.time_s + late)
+    return later(recording, np.where(recording.time_s > 2.0, 0.4, 0.0))
 
 
 def in_radians(recording: WireRecording) -> WireRecording:
