@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-SUBJECTS = ("emulator", "map", "planner", "scan", "stream")
+SUBJECTS = ("emulator", "identify", "map", "planner", "scan", "stream")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,0 +1,16 @@
+from pathlib import Path
+
+import pytest
+
+from emulator.config import load_config
+from tools.bench_identify import BACKLASH_ARCMIN, SPREAD, random_plant, write_plant
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_random_plant_is_a_configuration_and_the_same_again(seed: int, tmp_path: Path) -> None:
+    config = load_config(write_plant(tmp_path, seed))
+
+    assert BACKLASH_ARCMIN[0] <= config.gears.backlash_arcmin <= BACKLASH_ARCMIN[1]
+    assert config.table.inertia_kg_m2 == random_plant(seed)["table.inertia_kg_m2"]
+    assert config.driver == load_config().driver
+    assert len(random_plant(seed)) == len(SPREAD) + 1
