@@ -21,7 +21,8 @@ _SCALES_DEG = (3e-3, 1e-3, 3e-4, 1e-4)
 _RIDGE_STEPS = (-1.5, -0.7, 0.7, 1.5)
 _CLIMBED_ON = 3
 
-_CONFIDENCE_SCALE_DEG = 1e-3
+_RIDGE_SCALE_DEG = 1e-3
+_CONFIDENCE_SCALE_DEG = 1.5e-3
 """The covariance sees the readings no sharper than so: closer by, what it would tell of is one of many narrow peaks."""
 
 
@@ -89,10 +90,10 @@ def estimate(posterior: Posterior, starts: list[Array], progress: Callable[[floa
     for index, least_deg in enumerate(_SCALES_DEG):
         for stride in (4.0, 2.0, 1.0):
             best = _climb(posterior, best.vector, least_deg, stride, rounds=5)
-        if least_deg < _CONFIDENCE_SCALE_DEG:
+        if least_deg < _RIDGE_SCALE_DEG:
             best = _along_ridges(posterior, best, least_deg)
         progress((len(starts) + 3 * (index + 1)) / rounds)
-    return _with_covariance(posterior, best)
+    return _with_covariance(posterior, best, _CONFIDENCE_SCALE_DEG)
 
 
 def _along_ridges(posterior: Posterior, peak: Estimate, least_deg: float) -> Estimate:
@@ -101,7 +102,7 @@ def _along_ridges(posterior: Posterior, peak: Estimate, least_deg: float) -> Est
     Where one of the assumed constants is another, the readings can be explained nearly as well by other values of the
     rest: these lie on a ridge, and its peaks are narrow.
     """
-    covariance = _with_covariance(posterior, peak).covariance
+    covariance = _with_covariance(posterior, peak, _RIDGE_SCALE_DEG).covariance
     begins = [
         peak.vector + step * posterior.prior.deviation[index] * covariance[index] / covariance[index, index]
         for index in posterior.assumed
@@ -142,8 +143,8 @@ def _climb(posterior: Posterior, start: Array, least_deg: float, stride: float, 
     return Estimate(vector, np.empty((0, 0)), height, scale_deg, foretold)
 
 
-def _with_covariance(posterior: Posterior, peak: Estimate) -> Estimate:
+def _with_covariance(posterior: Posterior, peak: Estimate, sharpest_deg: float) -> Estimate:
     """Return the peak with the covariance about it; long differences see past the ruggedness."""
     jacobian = posterior.jacobian(peak.vector, 8.0)
-    information = posterior.information(jacobian, peak.foretold_deg, max(peak.scale_deg, _CONFIDENCE_SCALE_DEG))
+    information = posterior.information(jacobian, peak.foretold_deg, max(peak.scale_deg, sharpest_deg))
     return peak._replace(covariance=np.linalg.inv(information).astype(np.float64))

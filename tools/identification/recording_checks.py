@@ -95,6 +95,11 @@ def _check_against_commands(config: TableConfig, recording: WireRecording) -> No
             f"(travel {ratio:.3g} times as far): wrong units, a step of the clock, lost commands, "
             "or other gears and encoder than configured"
         )
+    if not at.exact:
+        raise RecordingError(
+            "the replies do not come at the table's ticks, so the times are not known well enough: something on the "
+            "line gathers bytes (the latency timer of a USB adapter?), or control.tick_hz is another"
+        )
 
 
 def _check_stall(time_s: Array, seen_deg: Array, foretold_deg: Array) -> None:

@@ -40,6 +40,11 @@ def with_the_clock_set_forward(recording: WireRecording) -> WireRecording:
     return later(recording, np.where(recording.time_s > 2.0, 0.4, 0.0))
 
 
+def with_replies_that_an_adapter_gathers(recording: WireRecording) -> WireRecording:
+    late_s = np.random.default_rng(1).uniform(0.0, 3e-3, len(recording.time_s))
+    return recording._replace(reply_s=recording.reply_s + late_s)
+
+
 def in_radians(recording: WireRecording) -> WireRecording:
     return recording._replace(position_deg=np.radians(recording.position_deg))
 
@@ -78,6 +83,7 @@ def test_a_good_recording_passes(assumed: TableConfig, recording: WireRecording)
         (with_a_gap, r"a gap of 1\.\d\d s at (19\.9|20\.0)"),
         (with_the_clock_set_back, r"the clock steps back by 0\.2\d* s at (19\.9|20\.0)"),
         (with_the_clock_set_forward, "not where its commands send it|a step of the clock|stall"),
+        (with_replies_that_an_adapter_gathers, "do not come at the table's ticks"),
         (in_radians, r"moves over [0-9.]+ deg only|not where its commands send it"),
         (in_milliseconds, "are its times in seconds"),
         (in_counts, "the wrong units"),

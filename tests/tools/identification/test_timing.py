@@ -51,6 +51,25 @@ def test_replies_that_come_a_little_late_tell_the_tick(
     assert_same_but_for_the_origin(told, exact.readings, exact.commands)
 
 
+def test_a_recorder_whose_clock_runs_faster_than_the_tables_finds_the_same_ticks(
+    exact: Timing, recording: WireRecording, assumed: TableConfig
+) -> None:
+    faster = 1.0 + 47e-6
+
+    told = timing(
+        assumed,
+        recording._replace(
+            time_s=recording.time_s * faster,
+            reply_s=recording.reply_s * faster,
+            commands=tuple(
+                sent._replace(time_s=sent.time_s * faster, reply_s=sent.reply_s * faster) for sent in recording.commands
+            ),
+        ),
+    )
+
+    assert_same_but_for_the_origin(told, exact.readings, exact.commands)
+
+
 def test_what_came_much_later_than_the_rest_is_in_doubt(recording: WireRecording, assumed: TableConfig) -> None:
     late_s = np.zeros(len(recording.time_s))
     late_s[::10] = 5e-3
