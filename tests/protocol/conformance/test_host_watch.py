@@ -45,9 +45,10 @@ def test_a_machine_that_stands_still_is_late_by_as_much_and_calm_after_it() -> N
 @pytest.mark.realtime
 def test_patience_ends_on_a_machine_that_is_never_calm() -> None:
     with HostWatch() as watch:
+        begin_s = time.monotonic()
         watch.wait_for_calm(allowed_s=-1.0, patience_s=0.3)
 
-        assert watch.late_s() > -1.0
+        assert time.monotonic() - begin_s >= 0.3
 
 
 def test_simulated_time_is_never_late() -> None:

@@ -1,0 +1,109 @@
+"""A session on a machine that is late: what it spoiled is run again, and no table is failed for it."""
+
+import dataclasses
+
+from emulator.protocol_emulator import Serial
+from protocol.conformance.case import Case, chosen_cases
+from protocol.conformance.profile import load_profile
+from protocol.conformance.rig import Rig
+from protocol.conformance.stand import InProcess
+from protocol.conformance.suite import Outcome, Session
+from protocol.conformance.verdict import Verdict
+from protocol.conformance.wire import RecordedPort
+from tests.protocol.conformance.mutants import Mutant, port_to
+
+
+class BusyMachine:
+    """A machine that is late in the first runs of a case and punctual from then on."""
+
+    def __init__(self, late_runs: int) -> None:
+        self._runs_left = late_runs + 1  # the session's first question is one
+        self.waits = 0
+
+    def restart(self) -> None:
+        self._runs_left -= 1
+
+    def late_s(self) -> float:
+        return 1.3 if self._runs_left >= 0 else 0.0
+
+    def wait_for_calm(self, allowed_s: float, patience_s: float) -> None:
+        assert 0.0 < allowed_s < patience_s
+        self.waits += 1
+
+
+def failing_at_first(failures: int) -> Case:
+    """A case that asks a true table something wrong so often, and is content after that."""
+    left = [failures]
+
+    def run(rig: Rig) -> None:
+        rig.expect(b"S 5")
+        left[0] -= 1
+        rig.expect(b"A 5", b"OK" if left[0] < 0 else b"no reply at all")
+
+    return dataclasses.replace(chosen_cases(["4.2/1"])[0], run=run)
+
+
+def outcome_on(machine: BusyMachine, case: Case) -> Outcome:
+    port = port_to(Mutant)
+    session = Session(RecordedPort(port), load_profile(), InProcess(port.table), watch=machine)
+    return session.run([case])[0]
+
+
+def test_a_failure_on_a_machine_that_was_late_is_run_again() -> None:
+    machine = BusyMachine(late_runs=2)
+
+    outcome = outcome_on(machine, failing_at_first(2))
+
+    assert outcome.verdict is Verdict.PASS
+    assert outcome.spoiled == ("this machine was 1.3 s late: b'A 5' got b'OK', not b'no reply at all'",) * 2
+    assert machine.waits == 2
+    assert [event.data for event in outcome.wire].count(b"A 5\r") == 1  # the wire is that of the run that counts
+
+
+def test_a_failure_on_a_punctual_machine_stands() -> None:
+    outcome = outcome_on(BusyMachine(late_runs=0), failing_at_first(1))
+
+    assert (outcome.verdict, outcome.spoiled) == (Verdict.FAIL, ())
+
+
+def test_a_table_that_fails_once_its_machine_is_calm_fails() -> None:
+    outcome = outcome_on(BusyMachine(late_runs=1), failing_at_first(9))
+
+    assert outcome.verdict is Verdict.FAIL
+    assert len(outcome.spoiled) == 1
+
+
+def test_a_machine_that_is_never_calm_is_an_error_and_no_fault_of_the_table() -> None:
+    outcome = outcome_on(BusyMachine(late_runs=9), failing_at_first(9))
+
+    assert outcome.verdict is Verdict.ERROR
+    assert outcome.reason.startswith("this machine was 1.3 s late: ")
+    assert len(outcome.spoiled) == 2
+
+
+def test_a_late_machine_does_not_make_a_pass_doubtful() -> None:
+    outcome = outcome_on(BusyMachine(late_runs=9), failing_at_first(0))
+
+    assert (outcome.verdict, outcome.spoiled) == (Verdict.PASS, ())
+
+
+class BusyWhileTheTableTurns(BusyMachine):
+    """A machine that is calm when the table has come to rest."""
+
+    def __init__(self, port: Serial) -> None:
+        super().__init__(late_runs=0)
+        self._port = port
+
+    def wait_for_calm(self, allowed_s: float, patience_s: float) -> None:
+        super().wait_for_calm(allowed_s, patience_s)
+        self._port.clock.sleep_s(10.0)
+
+
+def test_a_machine_that_is_late_at_the_first_question_asks_it_again() -> None:
+    port = port_to(Mutant)
+    port.write(b"P 20\r")  # a table in motion is refused
+    watch = BusyWhileTheTableTurns(port)
+
+    session = Session(RecordedPort(port), load_profile(), InProcess(port.table), watch=watch)
+
+    assert session.home_deg == 20
