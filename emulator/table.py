@@ -73,6 +73,8 @@ class Table:
     def receive(self, data: bytes) -> None:
         """Take bytes that the client puts on the line now."""
         self._serial.receive(data, self.tick, self._answer)
+        if self.observer is None:
+            self._serial.overheard()  # and forgotten: nobody watches
 
     def transmit(self) -> bytes:
         """Return the bytes that have left by now, and forget them."""

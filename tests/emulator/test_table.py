@@ -397,6 +397,13 @@ class TestDeterminism:
         assert skipping.snapshot().state == watched.snapshot().state
         assert skipping.status().true_deg < 1.0
 
+    def test_what_was_said_before_anybody_watched_is_not_kept(self) -> None:
+        table, seen = Table(load_config().with_serial(baud=0)), []
+        table.receive(b"H\r")
+        table.observer = lambda _status, heard, said: seen.append((heard, said))
+        table.advance(1)
+        assert seen == [(b"", b"")]
+
     def test_the_observer_sees_each_tick_and_each_byte(self) -> None:
         table, seen = Table(PACED), []
         table.observer = lambda status, heard, said: seen.append((status.tick, heard, said))
