@@ -2,10 +2,11 @@
 
 import argparse
 import math
+import os
 import socket
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -203,8 +204,11 @@ def _usage(option: str) -> Iterator[None]:
 
 
 def _say(sentence: str) -> None:
-    with suppress(OSError):  # Nobody may be reading any more.
+    try:
         print(f"emulator: {sentence}", file=sys.stderr, flush=True)
+    except OSError:  # Nobody reads any more. What is left in the buffer would fail once more when Python ends.
+        with Path(os.devnull).open("w") as nobody:
+            os.dup2(nobody.fileno(), sys.stderr.fileno())
 
 
 if __name__ == "__main__":

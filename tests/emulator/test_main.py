@@ -337,7 +337,8 @@ def test_at_rest_it_uses_nearly_no_time(stand_in: Start) -> None:
 
 def test_a_script_that_reads_one_line_and_no_more_does_not_stop_it() -> None:
     command = [sys.executable, "-m", "emulator", "--pty"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=buffered)
     assert process.stdout is not None
     name = process.stdout.readline().strip()
     process.stdout.close()
