@@ -1,5 +1,6 @@
 """What a gain set is judged by: figures of the linear loop, for many plants or many gain sets at once."""
 
+from collections.abc import Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -9,6 +10,8 @@ from emulator.config import TableConfig
 from tools.tuning.frequency_response import Array, Complex, PlantResponse, grid_hz, grid_z, plant_response
 from tools.tuning.linear_model import Teeth, duty_gains, quantisation_noise, speed_gain_deg_s
 from tools.tuning.margins import controller, margins, noise_duty
+
+SETTLED_SHARE = 0.1
 
 
 class Loops(NamedTuple):
@@ -43,6 +46,7 @@ class LoopFigures(NamedTuple):
     noise_duty: Array  # standard deviation of the duty, from the rounding of the position to counts
     bandwidth_hz: Array  # -3 dB of the speed over the reference, loaded
     overshoot: Array  # of the speed after a step of the reference, loaded; 0.1 is 10 %
+    settling_s: Array  # from a step of the reference or the load until the speed stays within a tenth of it
     ramp_lag_s: Array  # speed error over acceleration on a ramp
     load_peak_deg_s_Nm: Array  # speed lost at most after a step of the load
 
@@ -65,6 +69,9 @@ def loop_figures(loops: Loops, registers: Array) -> LoopFigures:
     sensitivity = 1.0 / (1.0 + regulator.by_measured * plant.measured_by_duty)
     tracking = plant.speed_by_duty * regulator.by_reference * sensitivity
     rejection = plant.speed_by_load - plant.speed_by_duty * regulator.by_measured * sensitivity * plant.measured_by_load
+    speed, lost = step_answer(tracking, 1.0), step_answer(rejection, 0.0)
+    load_peak = -lost.min(axis=-1)
+    settling = np.maximum(_settling_ticks(speed - 1.0, 1.0), _settling_ticks(lost, load_peak[..., None]))
     return LoopFigures(
         stable=np.all([state.stable for state in per_state], axis=0),
         sensitivity_peak=np.max([state.sensitivity_peak for state in per_state], axis=0),
@@ -72,9 +79,10 @@ def loop_figures(loops: Loops, registers: Array) -> LoopFigures:
         phase_margin_deg=np.min([state.phase_margin_deg for state in per_state], axis=0),
         noise_duty=np.max(noises, axis=0),
         bandwidth_hz=_bandwidth_hz(tracking, loops.frequency_hz),
-        overshoot=step_answer(tracking, 1.0).max(axis=-1) - 1.0,
+        overshoot=np.maximum(speed.max(axis=-1) - 1.0, 0.0),
+        settling_s=settling / tick_hz,
         ramp_lag_s=1.0 / (gains[..., 1] * tick_hz * loops.speed_gain_deg_s),
-        load_peak_deg_s_Nm=-step_answer(rejection, 0.0).min(axis=-1),
+        load_peak_deg_s_Nm=load_peak,
     )
 
 
@@ -90,8 +98,25 @@ def step_answer(response: Complex, at_rest: float) -> Array:
     return answer
 
 
+def joined(parts: Sequence[LoopFigures]) -> LoopFigures:
+    """Return the figures of several batches as those of one."""
+    return LoopFigures(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
 def _bandwidth_hz(tracking: Complex, frequency_hz: Array) -> Array:
-    below = np.abs(tracking) < np.sqrt(0.5)
-    first = np.where(below.any(axis=-1), np.argmax(below, axis=-1), -1)
-    result: Array = frequency_hz[first]
+    """Return where the size of the response, which is 1 at 0 Hz, first falls below -3 dB."""
+    size = np.log(np.abs(np.concatenate([np.ones((*tracking.shape[:-1], 1)), tracking], axis=-1)) * np.sqrt(2.0))
+    frequency_hz = np.concatenate([[0.0], frequency_hz])
+    below = size < 0.0
+    first = np.where(below.any(axis=-1), np.argmax(below, axis=-1), size.shape[-1] - 1)
+    before, after = (np.take_along_axis(size, at[..., None], axis=-1)[..., 0] for at in (first - 1, first))
+    share = np.clip(before / np.where(before == after, np.inf, before - after), 0.0, 1.0)
+    result: Array = frequency_hz[first - 1] + share * (frequency_hz[first] - frequency_hz[first - 1])
     return result
+
+
+def _settling_ticks(deviation: Array, height: Array | float) -> Array:
+    """Return the last tick at which the deviation is outside a tenth of the height."""
+    outside = np.abs(deviation) > SETTLED_SHARE * height
+    result: Array = np.where(outside.any(axis=-1), outside.shape[-1] - 1 - np.argmax(outside[..., ::-1], axis=-1), 0)
+    return result.astype(np.float64)

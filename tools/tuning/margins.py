@@ -46,10 +46,19 @@ def margins(loop: Complex, frequency_hz: Array) -> Margins:
     turned = np.angle(distance[..., 0]) + np.angle(distance[..., 1:] / distance[..., :-1]).sum(axis=-1)
     return Margins(
         np.abs(turned) < np.pi / 2,
-        1.0 / np.abs(distance).min(axis=-1),
+        1.0 / _least_size(distance),
         _gain_margin_db(loop),
         *_phase_margin(loop, frequency_hz),
     )
+
+
+def _least_size(curve: Complex) -> Array:
+    """Return the least distance of a curve from the origin, taken as straight between two frequencies."""
+    start, way = curve[..., :-1], np.diff(curve, axis=-1)
+    length2 = np.abs(way) ** 2
+    share = np.clip(-(start * way.conj()).real / np.where(length2 == 0.0, 1.0, length2), 0.0, 1.0)
+    result: Array = np.abs(start + share * way).min(axis=-1)
+    return result
 
 
 def _gain_margin_db(loop: Complex) -> Array:
