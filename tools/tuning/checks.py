@@ -11,15 +11,18 @@ from emulator.config import TableConfig
 from emulator.firmware import IDLE
 from emulator.pid import fixed_gains
 from tools.emulated import Answer, Array, Load, Motion, emulate
-from tools.tuning.linear_model import Teeth, closed_loop, moving_friction_Nm
+from tools.tuning.linear_model import Teeth, closed_loop, load_ratio, moving_friction_Nm
+from tools.tuning.loop_figures import SETTLED_SHARE
 
-LOAD_STEP_Nm = 0.29
-_STEP_FROM_DEG_S, _STEP_TO_DEG_S = 10.0, 15.0
-_SUDDEN_DEG_S2 = 25_000.0
-_SETTLED_SHARE = 0.1
+_STEP_FROM, _STEP_TO, _RAMP_TO, _CREEP = 0.25, 0.375, 0.5, 0.005
+"""Speeds, as shares of the greatest one."""
+_LOAD_STEP = 0.0078
+"""Share of the torque at standstill: 0.29 Nm for the default table."""
+_FAR_S = 100.0
+_LEAST_RAMP_S = 0.1
+_LONGEST_SETTLING_S = 10.0
 _SMALL_MOVES_DEG = (0.1, 0.2, 0.5, 1.0, 3.0)
-_CREEP_DEG_S = 0.2
-_STARTS = 24
+_STARTS = 64
 """Places between two counts from which steps are made; their mean shows the answer without the counts' ripple."""
 
 
@@ -57,9 +60,11 @@ def all_checks(config: TableConfig, seed: int) -> list[Check]:
 
 def ramp(config: TableConfig, seed: int) -> Check:
     """Speed up at the greatest acceleration to half the greatest speed, and keep it."""
-    acceleration, speed = config.limits.acceleration_deg_s2, config.limits.speed_deg_s / 2.0
-    start_s, ramp_s = 0.1, speed / acceleration
-    answer = emulate(config, [Motion(start_s, 1000.0, speed, acceleration)], start_s + ramp_s + 0.5, seed=seed)
+    speed, acceleration, ramp_s = _ramp(config)
+    start_s = 0.1
+    answer = emulate(
+        config, [Motion(start_s, _far_deg(config), speed, acceleration)], start_s + ramp_s + 0.5, seed=seed
+    )
     reference = answer.reference_speed_deg_s
     gains = fixed_gains(config, config.gains.ramp)
     loop = closed_loop(config, Teeth.DRIVING, gains)
@@ -75,30 +80,28 @@ def ramp(config: TableConfig, seed: int) -> Check:
         "speed error, deg/s",
         Curve(answer.time_s, error, foretold),
         (
-            Figure(f"speed lag on a ramp of {acceleration:g} deg/s2", "deg/s", *_means(error, foretold, late)),
-            Figure(f"encoder behind the reference at {speed:g} deg/s", "deg", *_means(lag, linear_lag, steady)),
+            Figure(f"speed lag on a ramp of {acceleration:.3g} deg/s2", "deg/s", *_means(error, foretold, late)),
+            Figure(f"encoder behind the reference at {speed:.3g} deg/s", "deg", *_means(lag, linear_lag, steady)),
         ),
     )
 
 
 def step(config: TableConfig, seed: int) -> Check:
     """Let the reference jump from one speed to another, under the constant-speed set."""
-    at_s = 1.0
-    motions = [
-        Motion(0.1, 1000.0, _STEP_FROM_DEG_S, config.limits.acceleration_deg_s2),
-        Motion(at_s, 1000.0, _STEP_TO_DEG_S, _SUDDEN_DEG_S2),
-    ]
+    low, high = (share * config.limits.speed_deg_s for share in (_STEP_FROM, _STEP_TO))
+    height, at_s = high - low, _cruising_s(config)
+    in_one_tick = 2.0 * height * config.control.tick_hz
+    motions = [Motion(0.1, _far_deg(config), low, _ramp(config)[1]), Motion(at_s, _far_deg(config), high, in_one_tick)]
     time_s, speed_deg_s = _mean_speed(config, motions, at_s + 0.3, [], seed)
-    height = _STEP_TO_DEG_S - _STEP_FROM_DEG_S
     model = _after_step(config, time_s, at_s, height, 0.0)
-    seen = speed_deg_s - _STEP_FROM_DEG_S
+    seen = speed_deg_s - low
     after = time_s > at_s
-    overshoot = [float(100.0 * (curve[after].max() / height - 1.0)) for curve in (seen, model)]
+    overshoot = [max(0.0, float(100.0 * (curve[after].max() / height - 1.0))) for curve in (seen, model)]
     settling = [_settling_ms(time_s[after] - at_s, curve[after] - height, height) for curve in (seen, model)]
     window = time_s > at_s - 0.02
     return Check(
-        "step of the reference",
-        "speed of the table, deg/s",
+        f"step of the reference from {low:.3g} to {high:.3g} deg/s",
+        "speed gained by the table, deg/s",
         Curve(time_s[window] - at_s, seen[window], model[window]),
         (Figure("overshoot", "%", *overshoot), Figure("settling to 10 % after a step", "ms", *settling)),
     )
@@ -106,27 +109,34 @@ def step(config: TableConfig, seed: int) -> Check:
 
 def load_step(config: TableConfig, seed: int) -> Check:
     """Load the table while it turns at a constant speed."""
-    at_s = 1.0
-    motions = [Motion(0.1, 1000.0, _STEP_FROM_DEG_S, config.limits.acceleration_deg_s2)]
-    time_s, speed_deg_s = _mean_speed(config, motions, at_s + 0.3, [Load(at_s, LOAD_STEP_Nm)], seed)
-    model = _after_step(config, time_s, at_s, 0.0, LOAD_STEP_Nm)
-    seen = speed_deg_s - _STEP_FROM_DEG_S
+    speed, load_Nm, at_s = _STEP_FROM * config.limits.speed_deg_s, load_step_Nm(config), _cruising_s(config)
+    motions = [Motion(0.1, _far_deg(config), speed, _ramp(config)[1])]
+    time_s, speed_deg_s = _mean_speed(config, motions, at_s + 0.3, [Load(at_s, load_Nm)], seed)
+    model = _after_step(config, time_s, at_s, 0.0, load_Nm)
+    seen = speed_deg_s - speed
     after = time_s > at_s
     peaks = [float(-curve[after].min()) for curve in (seen, model)]
     settling = [_settling_ms(time_s[after] - at_s, curve[after], peaks[1]) for curve in (seen, model)]
     window = time_s > at_s - 0.02
     return Check(
-        f"load step of {LOAD_STEP_Nm:g} Nm",
-        "speed lost by the table, deg/s",
+        f"load step of {load_Nm:g} Nm",
+        "speed gained by the table, deg/s",
         Curve(time_s[window] - at_s, seen[window], model[window]),
         (Figure("peak after the load step", "deg/s", *peaks), Figure("settling to 10 % of it", "ms", *settling)),
     )
 
 
+def load_step_Nm(config: TableConfig) -> float:
+    """Return the load that is put on the table: a small share of what the motor can drive."""
+    at_motor_Nm = config.motor.torque_constant_Nm_A * config.driver.supply_V / config.motor.resistance_ohm
+    return float(f"{_LOAD_STEP * at_motor_Nm / load_ratio(config, Teeth.DRIVING):.2g}")
+
+
 def small_moves(config: TableConfig, seed: int) -> Check:
-    """Make small moves from rest, there and back."""
+    """Make small moves from rest, there and back, each with time enough to come to rest."""
     speed, acceleration = config.power_on.speed_deg_s, config.power_on.acceleration_deg_s2
-    pause_s = config.protection.settling_time_s
+    longest_deg = 2.0 * max(_SMALL_MOVES_DEG)
+    pause_s = longest_deg / speed + speed / acceleration + min(config.protection.settling_time_s, _LONGEST_SETTLING_S)
     targets = [sign * angle for angle in _SMALL_MOVES_DEG for sign in (1.0, -1.0)]
     motions = [Motion(0.1 + index * pause_s, angle, speed, acceleration) for index, angle in enumerate(targets)]
     answer = emulate(config, motions, 0.1 + len(targets) * pause_s, seed=seed)
@@ -139,18 +149,19 @@ def small_moves(config: TableConfig, seed: int) -> Check:
         Curve(answer.time_s, answer.encoder_deg, None),
         (
             Figure("greatest distance from the target at rest", "deg", float(misses.max()), None),
-            Figure("longest move of up to 3 deg", "s", arrival_s, None),
+            Figure(f"longest move of up to {longest_deg:g} deg", "s", arrival_s, None),
         ),
     )
 
 
 def reversal(config: TableConfig, seed: int) -> Check:
     """Turn back at speed, through the backlash."""
-    acceleration, speed = config.limits.acceleration_deg_s2, config.limits.speed_deg_s / 2.0
-    motions = [Motion(0.1, 1000.0, speed, acceleration), Motion(0.8, -1000.0, speed, acceleration)]
-    answer = emulate(config, motions, 1.8, seed=seed)
+    speed, acceleration, ramp_s = _ramp(config)
+    at_s = 0.6 + ramp_s
+    motions = [Motion(0.1, _far_deg(config), speed, acceleration), Motion(at_s, -_far_deg(config), speed, acceleration)]
+    answer = emulate(config, motions, at_s + 2.0 * ramp_s + 0.6, seed=seed)
     error = answer.reference_deg - answer.encoder_deg
-    window = answer.time_s > 0.7
+    window = answer.time_s > at_s - 0.1
     return Check(
         "reversal through the backlash",
         "encoder behind, deg",
@@ -161,15 +172,33 @@ def reversal(config: TableConfig, seed: int) -> Check:
 
 def creep(config: TableConfig, seed: int) -> Check:
     """Creep, where stiction and the quantum of the speed weigh most."""
-    answer = emulate(config, [Motion(0.1, 1000.0, _CREEP_DEG_S, 1.0)], 4.0, seed=seed)
+    speed = _CREEP * config.limits.speed_deg_s
+    answer = emulate(config, [Motion(0.1, _far_deg(config), speed, 5.0 * speed)], 4.0, seed=seed)
     late = answer.time_s > 2.0
     ripple = float(answer.true_speed_deg_s[late].std())
     return Check(
-        f"creeping at {_CREEP_DEG_S:g} deg/s",
+        f"creeping at {speed:.3g} deg/s",
         "speed of the table, deg/s",
         Curve(answer.time_s, answer.true_speed_deg_s, None),
         (Figure("ripple of the speed at creep", "deg/s", ripple, None),),
     )
+
+
+def _ramp(config: TableConfig) -> tuple[float, float, float]:
+    """Return speed, acceleration and duration of a ramp that lasts long enough to be seen."""
+    speed = _RAMP_TO * config.limits.speed_deg_s
+    acceleration = min(config.limits.acceleration_deg_s2, speed / _LEAST_RAMP_S)
+    return speed, acceleration, speed / acceleration
+
+
+def _far_deg(config: TableConfig) -> float:
+    """Return a target that no run of a check gets to."""
+    return _FAR_S * config.limits.speed_deg_s
+
+
+def _cruising_s(config: TableConfig) -> float:
+    """Return when a table that was started at 0.1 s has long been at the lower speed of a step."""
+    return 0.9 + _STEP_FROM * config.limits.speed_deg_s / _ramp(config)[1]
 
 
 def _mean_speed(
@@ -203,7 +232,7 @@ def _means(seen: Array, foretold: Array, where: NDArray[np.bool_]) -> tuple[floa
 
 def _settling_ms(time_s: Array, deviation: Array, height: float) -> float:
     """Return when the deviation last leaves a band of a tenth of the height."""
-    outside = np.flatnonzero(np.abs(deviation) > _SETTLED_SHARE * height)
+    outside = np.flatnonzero(np.abs(deviation) > SETTLED_SHARE * height)
     return float(1e3 * time_s[outside[-1]]) if len(outside) else 0.0
 
 
