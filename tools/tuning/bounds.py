@@ -1,11 +1,14 @@
 """The bounds that a gain set must keep, and how far it is from each."""
 
+from math import ceil, floor, log10
 from typing import NamedTuple
 
 import numpy as np
 
 from tools.tuning.frequency_response import Array
 from tools.tuning.loop_figures import LoopFigures
+
+_EASE = 0.01
 
 
 class Bound(NamedTuple):
@@ -28,9 +31,20 @@ class Bound(NamedTuple):
         """Return a value of this figure with its unit."""
         return f"{value * self.scale:.3g}{self.unit}"
 
+    def allowing(self, value: float) -> float:
+        """Return a limit of two digits that the value keeps with a little to spare."""
+        eased = value * (1.0 + _EASE if self.at_most else 1.0 - _EASE)
+        power = 10.0 ** (floor(log10(abs(eased))) - 1)
+        return float((ceil if self.at_most else floor)(eased / power) * power)
+
+    @property
+    def asked(self) -> str:
+        """The limit in words."""
+        return f"{'at most' if self.at_most else 'at least'} {self.shown(self.limit)}"
+
     def __str__(self) -> str:
         """Return the bound in words."""
-        return f"{self.title} {'at most' if self.at_most else 'at least'} {self.shown(self.limit)}"
+        return f"{self.title} {self.asked}"
 
 
 class Limits(NamedTuple):
@@ -42,6 +56,7 @@ class Limits(NamedTuple):
     noise_duty: float = 0.004
     bandwidth_hz: float = 10.0
     overshoot: float = 0.10
+    settling_s: float = 0.1
 
     def for_ramp(self) -> tuple[Bound, ...]:
         """Return the bounds of the ramp set."""
@@ -55,7 +70,11 @@ class Limits(NamedTuple):
 
     def for_hold(self) -> tuple[Bound, ...]:
         """Return the bounds of the constant-speed set: those of the ramp set, and a clean step answer."""
-        return (*self.for_ramp(), Bound("overshoot", "overshoot", self.overshoot, True, 100.0, " %"))
+        return (
+            *self.for_ramp(),
+            Bound("overshoot", "overshoot", self.overshoot, True, 100.0, " %"),
+            Bound("settling_s", "settling", self.settling_s, True, 1e3, " ms"),
+        )
 
 
 def violation(bounds: tuple[Bound, ...], figures: LoopFigures) -> Array:

@@ -5,6 +5,10 @@ registers before it is judged, so the result is what will run. Among candidates 
 decides, otherwise how little they break them; so when nothing keeps the bounds, the best that can be had comes out.
 """
 
+from collections.abc import Callable
+from functools import partial
+from itertools import combinations
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -13,16 +17,20 @@ from emulator.fixed_point import GAIN_BITS, INT32_MAX, INTEGRAL_GAIN_BITS
 from emulator.pid import Gains
 from tools.tuning.bounds import Bound, violation
 from tools.tuning.frequency_response import Array
-from tools.tuning.linear_model import speed_quantum_deg_s
-from tools.tuning.loop_figures import LoopFigures, Loops, loop_figures
+from tools.tuning.linear_model import Teeth, speed_quantum_deg_s, time_constant_s
+from tools.tuning.loop_figures import LoopFigures, Loops, joined, loop_figures
 
-LEAST_LAG = "ramp_lag_s"
-LEAST_LOAD_PEAK = "load_peak_deg_s_Nm"
+Objective = Callable[[LoopFigures], Array]
+
+LEAST_LAG: Objective = attrgetter("ramp_lag_s")
+LEAST_LOAD_PEAK: Objective = attrgetter("load_peak_deg_s_Nm")
 
 _COARSE = (18, 18, 9)
 _FINE = (7, 7, 7)
 _ZOOMS = 6
 _BINDING_SHARE = 0.02
+_BATCH = 1 << 20
+"""Candidates times frequencies that are judged at once, for the sake of the memory."""
 
 
 class Design(NamedTuple):
@@ -43,13 +51,13 @@ class Design(NamedTuple):
         return tuple(bound for bound in self.bounds if bound.excess(self.figures)[0] > -_BINDING_SHARE)
 
 
-def design(loops: Loops, bounds: tuple[Bound, ...], objective: str) -> Design:
-    """Return the gain set with the least `objective`, a field of `LoopFigures`, within the bounds.
+def design(loops: Loops, bounds: tuple[Bound, ...], objective: Objective) -> Design:
+    """Return the gain set with the least `objective` within the bounds.
 
     Args:
         loops: The loops of one table.
         bounds: What the gain set must keep.
-        objective: `LEAST_LAG` or `LEAST_LOAD_PEAK`.
+        objective: What is to be least of a loop's figures, such as `LEAST_LAG` or `LEAST_LOAD_PEAK`.
     """
     low, high = _search_box(loops)
     best = np.zeros(3)
@@ -57,29 +65,58 @@ def design(loops: Loops, bounds: tuple[Bound, ...], objective: str) -> Design:
         counts = _FINE if zoom else _COARSE
         axes = [np.linspace(start, end, count) for start, end, count in zip(low, high, counts, strict=True)]
         points = np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=-1)
-        figures = loop_figures(loops, _registers(loops, points))
-        best = points[_best(figures, bounds, objective)]
+        best = points[_best(_figures(loops, points), bounds, objective)]
         reach = np.array([axis[1] - axis[0] for axis in axes])
         low, high = best - reach, best + reach
     gains = Gains(*(int(value) for value in _registers(loops, best[None])[0]))
     return Design(gains, loop_figures(loops, np.array([gains])), bounds)
 
 
-def _best(figures: LoopFigures, bounds: tuple[Bound, ...], objective: str) -> int:
+class Relaxation(NamedTuple):
+    """Bounds that together stand in the way, and the values that they would have to allow instead."""
+
+    bounds: tuple[Bound, ...]
+    figures: LoopFigures
+
+
+def relaxations(loops: Loops, refused: Design) -> tuple[Relaxation, ...]:
+    """Return which one of the bounds to relax, or where no one is enough, which two."""
+    for count in (1, 2):
+        found = []
+        for group in combinations(refused.binding, count):
+            others = tuple(bound for bound in refused.bounds if bound not in group)
+            best = design(loops, others, partial(violation, group))
+            if best.figures.stable[0] and not best.broken:
+                found.append(Relaxation(group, best.figures))
+        if found:
+            return tuple(found)
+    return ()
+
+
+def _figures(loops: Loops, points: Array) -> LoopFigures:
+    registers = _registers(loops, points)
+    batches = np.array_split(registers, -(-registers.shape[0] * len(loops.z) // _BATCH))
+    return joined([loop_figures(loops, batch) for batch in batches])
+
+
+def _best(figures: LoopFigures, bounds: tuple[Bound, ...], objective: Objective) -> int:
     broken = violation(bounds, figures)
     if broken.min() > 0.0:
         return int(np.argmin(broken))
-    return int(np.argmin(np.where(broken > 0.0, np.inf, getattr(figures, objective))))
+    return int(np.argmin(np.where(broken > 0.0, np.inf, objective(figures))))
 
 
 def _search_box(loops: Loops) -> tuple[Array, Array]:
     """Return the corners of the search: the logarithms of K times the plant's gain and of Ti, and Td over the window.
 
-    The delay of the loop, about half the window and two ticks, is the only time scale that limits the gains.
+    The delay of the loop, about half the window and two ticks, limits the gains: a motor so slow that, free of its
+    load, it integrates over the delay bears a gain in proportion to its time constant.
     """
     control = loops.config.control
     delay_s = (control.speed_window_ticks / 2 + 2) / control.tick_hz
-    return np.array([np.log(0.05), np.log(0.2 * delay_s), 0.0]), np.array([np.log(5.0), np.log(20.0 * delay_s), 1.0])
+    slowness = max(time_constant_s(loops.config, Teeth.FREE) / delay_s, 1.0)
+    low = [np.log(0.05), np.log(0.2 * delay_s), 0.0]
+    return np.array(low), np.array([np.log(5.0 * slowness), np.log(20.0 * delay_s), 1.0])
 
 
 def _registers(loops: Loops, points: Array) -> Array:
@@ -93,6 +130,6 @@ def _registers(loops: Loops, points: Array) -> Array:
     scaled = np.stack(
         [steps * 2.0**GAIN_BITS, integral * 2.0**INTEGRAL_GAIN_BITS, derivative * 2.0**GAIN_BITS], axis=-1
     )
-    least = np.array([0.0, 1.0, 0.0])
+    least = np.array([1.0, 1.0, 0.0])  # the configuration states the others in proportion to the first
     result: Array = np.clip(np.round(scaled), least, INT32_MAX)
     return result

@@ -1,18 +1,19 @@
 """Monte Carlo over the spread of the plant: how many of the tables that might be built meet the bounds."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from emulator.config import TableConfig
-from emulator.pid import Gains
 from tools.tuning.bounds import Bound
 from tools.tuning.frequency_response import Array
-from tools.tuning.loop_figures import LoopFigures, Loops, loop_figures
+from tools.tuning.gain_design import Design
+from tools.tuning.loop_figures import LoopFigures, Loops, joined, loop_figures
 
-GRID_SIZE = 256
-"""Coarser than that of the design; its answers in time are 0.256 s long, more than any loop within the bounds needs."""
+_BATCH = 1 << 17
+"""Plants times frequencies that are judged at once, for the sake of the memory."""
 
 SPREAD_KEYS = (
     ("motor", "resistance_ohm"),
@@ -41,9 +42,24 @@ def spread_tables(config: TableConfig, count: int, spread: float, seed: int) -> 
     return [_scaled(config, row) for row in factors]
 
 
-def monte_carlo(loops: Loops, gains: Gains, bounds: tuple[Bound, ...]) -> Outcome:
-    """Return how the plants of `loops` do under one gain set."""
-    figures = loop_figures(loops, np.array([gains]))
+def monte_carlo(
+    tables: list[TableConfig],
+    designs: Sequence[Design],
+    grid_size: int,
+    progress: Callable[[float], None] = lambda _: None,
+) -> list[Outcome]:
+    """Return how the tables do under each of the gain sets, on a grid of frequencies that all of them share."""
+    parts: list[list[LoopFigures]] = [[] for _ in designs]
+    count = max(1, 2 * _BATCH // grid_size)
+    for start in range(0, len(tables), count):
+        loops = Loops.of(tables[start : start + count], grid_size)
+        for figures, designed in zip(parts, designs, strict=True):
+            figures.append(loop_figures(loops, np.array([designed.gains])))
+        progress(min((start + count) / len(tables), 1.0))
+    return [_outcome(joined(figures), designed.bounds) for figures, designed in zip(parts, designs, strict=True)]
+
+
+def _outcome(figures: LoopFigures, bounds: tuple[Bound, ...]) -> Outcome:
     kept = np.array([figures.stable & (bound.excess(figures) <= 0.0) for bound in bounds])
     shares = tuple((bound, float(row.mean())) for bound, row in zip(bounds, kept, strict=True))
     return Outcome(figures, shares, float(kept.all(axis=0).mean()), float(figures.stable.mean()))
