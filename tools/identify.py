@@ -6,13 +6,15 @@ python -m tools.identify fit trace.csv --out table.toml
 
 import argparse
 import sys
+from math import inf
 from pathlib import Path
 
 from emulator.config import load_config
 from emulator.toml_section import ConfigError
+from planner.whole_file import write_whole
 from protocol.client import TableClient
 from protocol.errors import TableError
-from tools.html_report import write_whole
+from tools.command_line import check_writable, ended
 from tools.identification.excitation import excitation
 from tools.identification.fit_report import fit_report, table_toml, verdict
 from tools.identification.identify_table import identify
@@ -21,28 +23,29 @@ from tools.identification.recording import RecordingError, read_recording, write
 from tools.identification.recording_checks import LEAST_DURATION_S, check_recording
 from tools.progress import Progress
 
+_LONGEST_S = 3600.0
 _NEEDED = ("gain", "time constant", "Coulomb friction")
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
     options = _parser().parse_args(arguments)
-    try:
-        return int(options.run(options))
-    except (ConfigError, RecordingError, TableError, OSError) as error:
-        print(f"identify: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("identify: interrupted", file=sys.stderr)
-        return 130
+    return ended("identify", lambda: int(options.run(options)), ConfigError, RecordingError, TableError)
 
 
 def _record(options: argparse.Namespace) -> int:
-    if options.duration < LEAST_DURATION_S:
-        raise RecordingError(f"--duration is {options.duration:g}; it must be at least {LEAST_DURATION_S:g} s")
-    for name in ("speed", "acceleration"):
-        if getattr(options, name) < 1.0:
-            raise RecordingError(f"--{name} is {getattr(options, name):g}; it must be at least 1")
+    for name, least, most in (
+        ("duration", LEAST_DURATION_S, _LONGEST_S),
+        ("speed", 1.0, inf),
+        ("acceleration", 1.0, inf),
+        ("baud", 0, inf),
+        ("seed", 0, inf),
+    ):
+        value = getattr(options, name)
+        if not least <= value <= most or value == inf:
+            allowed = f"at least {least:g}" if most == inf else f"within {least:g} to {most:g}"
+            raise RecordingError(f"--{name} is {value:g}; it must be {allowed}")
+    check_writable(options.out)
     bursts = excitation(options.duration, options.speed, options.acceleration, options.seed)
     with TableClient.open(options.port, baud=options.baud) as client, Progress("recording") as progress:
         recording = record(client, bursts, options.speed, options.baud, progress.show)
@@ -52,6 +55,10 @@ def _record(options: argparse.Namespace) -> int:
 
 
 def _fit(options: argparse.Namespace) -> int:
+    report = options.out.with_suffix(".html")
+    for path in (options.out, report):
+        check_writable(path)
+    _check_distinct([options.recording, *([options.config] if options.config else []), options.out, report])
     config = load_config(options.config)
     recording = read_recording(options.recording)
     try:
@@ -66,11 +73,20 @@ def _fit(options: argparse.Namespace) -> int:
         raise RecordingError(
             f"{options.recording}: cannot tell {', '.join(untold)}: too short, or too little excitation"
         )
+    page = fit_report(found, config, str(options.recording))
     write_whole(options.out, table_toml(found))
-    report = options.out.with_suffix(".html")
-    write_whole(report, fit_report(found, config, str(options.recording)))
+    write_whole(report, page)
     print(f"wrote {options.out} and {report}", file=sys.stderr)
     return 0
+
+
+def _check_distinct(paths: list[Path]) -> None:
+    """Refuse to write over what is read, or the report over the constants."""
+    for path in paths:
+        if [other.resolve() for other in paths].count(path.resolve()) > 1:
+            raise RecordingError(
+                f"{path} would be written over; --out must be another file, and its name not end in .html"
+            )
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -8,11 +8,14 @@ Writes gains.toml (for `python -m emulator --config`), gains.h, report.html and 
 
 import argparse
 import sys
+from contextlib import ExitStack
+from math import inf
 from pathlib import Path
 
 from emulator.config import load_config
 from emulator.toml_section import ConfigError
-from tools.html_report import write_whole
+from planner.whole_file import whole_file
+from tools.command_line import check_folder, ended
 from tools.progress import Progress
 from tools.tuning.bounds import Limits
 from tools.tuning.gain_files import gains_header, gains_toml
@@ -23,30 +26,31 @@ from tools.tuning.tuned_table import Tuning, TuningError, tune
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
     options = _parser().parse_args(arguments)
-    try:
-        config = load_config(options.config)
-        limits = _limits(options)
-        with Progress("tuning") as progress:
-            tuning = tune(config, limits, options.plants, options.spread / 100.0, options.seed, progress.show)
-        _write(options.out, tuning)
-    except (ConfigError, TuningError, OSError) as error:
-        print(f"tune: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("tune: interrupted", file=sys.stderr)
-        return 130
+    return ended("tune", lambda: _tune(options), ConfigError, TuningError)
+
+
+def _tune(options: argparse.Namespace) -> int:
+    config = load_config(options.config)
+    limits = _limits(options)
+    check_folder(options.out)
+    with Progress("tuning") as progress:
+        tuning = tune(config, limits, options.plants, options.spread / 100.0, options.seed, progress.show)
+    _write(options.out, tuning)
     _print(tuning)
     return 0
 
 
 def _limits(options: argparse.Namespace) -> Limits:
-    if options.ms <= 1.0:
-        raise TuningError(f"--ms is {options.ms:g}; it must be greater than 1")
-    for name in ("gain_margin", "phase_margin", "noise", "bandwidth", "overshoot"):
-        if getattr(options, name) <= 0.0:
-            raise TuningError(f"--{name.replace('_', '-')} is {getattr(options, name):g}; it must be greater than 0")
-    if options.plants < 1 or not 0.0 <= options.spread < 100.0:
-        raise TuningError("--plants must be at least 1, --spread within 0..100 %")
+    for name in ("ms", "gain_margin", "phase_margin", "noise", "bandwidth", "overshoot", "settling"):
+        value, least = getattr(options, name), 1.0 if name == "ms" else 0.0
+        if not least < value < inf:
+            raise TuningError(f"--{name.replace('_', '-')} is {value:g}; it must be a number greater than {least:g}")
+    if options.plants < 1:
+        raise TuningError(f"--plants is {options.plants}; it must be at least 1")
+    if not 0.0 <= options.spread < 100.0:
+        raise TuningError(f"--spread is {options.spread:g}; it must be at least 0 and less than 100 %")
+    if options.seed < 0:
+        raise TuningError(f"--seed is {options.seed}; it must be at least 0")
     return Limits(
         options.ms,
         options.gain_margin,
@@ -54,18 +58,21 @@ def _limits(options: argparse.Namespace) -> Limits:
         options.noise / 100.0,
         options.bandwidth,
         options.overshoot / 100.0,
+        options.settling / 1e3,
     )
 
 
 def _write(folder: Path, tuning: Tuning) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    sets = {name: getattr(tuning.after.gains, name) for name in tuning.sets}
-    write_whole(folder / "gains.toml", gains_toml(sets))
-    write_whole(folder / "gains.h", gains_header({name: tuned.design.gains for name, tuned in tuning.sets.items()}))
+    """Write all files, or none of them."""
     drawings = plots(tuning)
-    for name, drawing in drawings.items():
-        write_whole(folder / f"{name}.svg", drawing)
-    write_whole(folder / "report.html", tune_report(tuning, drawings))
+    gains = {name: tuned.design.gains for name, tuned in tuning.sets.items()}
+    files = {"gains.toml": gains_toml(tuning.after), "gains.h": gains_header(tuning.after, gains)}
+    files |= {f"{name}.svg": drawing for name, drawing in drawings.items()}
+    files["report.html"] = tune_report(tuning, drawings)
+    folder.mkdir(parents=True, exist_ok=True)
+    with ExitStack() as stack:
+        for name, text in files.items():
+            stack.enter_context(whole_file(folder / name)).write_text(text, encoding="utf-8")
     print(f"wrote gains.toml, gains.h, report.html and plots to {folder}", file=sys.stderr)
 
 
@@ -114,6 +121,13 @@ def _parser() -> argparse.ArgumentParser:
         default=100.0 * defaults.overshoot,
         metavar="PERCENT",
         help="the most after a step, of the constant-speed set (%(default)s)",
+    )
+    parser.add_argument(
+        "--settling",
+        type=float,
+        default=1e3 * defaults.settling_s,
+        metavar="MS",
+        help="the most until a step of speed or load is settled to 10 %%, of the constant-speed set (%(default)s)",
     )
     parser.add_argument("--plants", type=int, default=1000, metavar="N", help="of the Monte Carlo (%(default)s)")
     parser.add_argument(

@@ -38,3 +38,39 @@ def test_a_useless_recording_is_refused_in_one_line(tmp_path: Path, capsys: pyte
     assert "1 readings in 0.0 s; needed are 300 in 10 s" in message
     assert message.count("\n") == 1
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (["--duration", "nan"], "--duration is nan; it must be within 10 to 3600"),
+        (["--duration", "inf"], "--duration is inf; it must be within 10 to 3600"),
+        (["--speed", "nan"], "--speed is nan; it must be at least 1"),
+        (["--acceleration", "0"], "--acceleration is 0; it must be at least 1"),
+        (["--baud", "-1"], "--baud is -1; it must be at least 0"),
+        (["--out", "/nowhere/trace.csv"], "/nowhere is not a folder"),
+    ],
+)
+def test_the_table_is_not_moved_for_a_recording_that_cannot_be_kept(
+    options: list[str], complaint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status = main(["record", "--port", "/nowhere/port", "--out", str(tmp_path / "trace.csv"), *options])
+
+    message = capsys.readouterr().err
+    assert status == 2
+    assert complaint in message
+    assert message.count("\n") == 1
+
+
+@pytest.mark.parametrize("out", ["trace.csv", "known.toml", "table.html"])
+def test_a_fit_writes_over_nothing_that_it_reads(out: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("trace.csv", "known.toml"):
+        (tmp_path / name).write_text("", encoding="ascii")
+
+    status = main(
+        ["fit", str(tmp_path / "trace.csv"), "--config", str(tmp_path / "known.toml"), "--out", str(tmp_path / out)]
+    )
+
+    assert status == 2
+    assert f"{tmp_path / out} would be written over" in capsys.readouterr().err
+    assert {path.name for path in tmp_path.iterdir()} == {"trace.csv", "known.toml"}

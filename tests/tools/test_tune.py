@@ -1,3 +1,7 @@
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -24,9 +28,13 @@ def test_the_command_line_writes_gains_header_report_and_plots(
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        (["--ms", "1"], "--ms is 1; it must be greater than 1"),
-        (["--noise", "0"], "--noise is 0; it must be greater than 0"),
-        (["--plants", "0"], "--plants must be at least 1"),
+        (["--ms", "1"], "--ms is 1; it must be a number greater than 1"),
+        (["--ms", "nan"], "--ms is nan; it must be a number greater than 1"),
+        (["--noise", "0"], "--noise is 0; it must be a number greater than 0"),
+        (["--settling", "inf"], "--settling is inf; it must be a number greater than 0"),
+        (["--plants", "0"], "--plants is 0; it must be at least 1"),
+        (["--spread", "nan"], "--spread is nan; it must be at least 0 and less than 100 %"),
+        (["--seed", "-1"], "--seed is -1; it must be at least 0"),
         (["--config", "/nowhere/table.toml"], "/nowhere/table.toml: cannot be read"),
         (["--bandwidth", "200"], "best that can be had is bandwidth 28 Hz (asked is at least 200 Hz)"),
     ],
@@ -41,3 +49,56 @@ def test_what_cannot_be_done_is_said_in_one_line(
     assert complaint in message
     assert message.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("constants", "key"),
+    [
+        ("[motor]\nresistance_ohm = -1.0\n", "motor.resistance_ohm"),
+        ("[table]\ninertia_kg_m2 = 0.0\n", "table.inertia_kg_m2"),
+        ("[gears]\nefficiency = 1.2\n", "gears.efficiency"),
+        ("[control]\ntick_hz = 0\n", "control.tick_hz"),
+        ("[limits]\nspeed_deg_s = 1e5\n", "limits.speed_deg_s"),
+    ],
+)
+def test_an_impossible_constant_is_named_by_its_key(
+    constants: str, key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "table.toml"
+    path.write_text(constants, encoding="utf-8")
+
+    status = main(["--config", str(path), "--out", str(tmp_path / "out")])
+
+    message = capsys.readouterr().err
+    assert status == 2
+    assert f"{path}: {key} is" in message
+    assert message.count("\n") == 1
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+
+    status = main(["--out", str(tmp_path / "file" / "out")])
+
+    assert status == 2
+    assert capsys.readouterr().err == f"tune: {tmp_path / 'file'} is not a folder\n"
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGINT") or sys.platform == "win32", reason="there is no Ctrl-C to send")
+def test_an_interrupt_ends_with_130_and_leaves_nothing(tmp_path: Path) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", "import tools.tune as t, sys; print('on', flush=True); sys.exit(t.main())",
+         "--plants", "100000", "--out", str(tmp_path / "out")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        assert process.stdout.readline() == "on\n"
+        time.sleep(1.0)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60.0)
+
+    assert process.returncode == 130
+    assert errors == "tune: interrupted\n"
+    assert not list(tmp_path.iterdir())

@@ -1,9 +1,17 @@
-"""Gain sets as files: a TOML section for the emulator's configuration, and a C header in the firmware's formats."""
+"""Gain sets as files: a configuration for the emulator, and a C header in the firmware's formats."""
+
+from dataclasses import fields
 
 from emulator.config import GainsConfig, TableConfig
 from emulator.fixed_point import GAIN_BITS, INTEGRAL_GAIN_BITS
 from emulator.pid import Gains
+from tools.config_file import config_toml
 from tools.tuning.linear_model import duty_gains
+
+_COMMENT = (
+    "Tuned gain sets, and the constants of the table that they are for where it is not the default one.\nFor --config."
+)
+_KEYS = frozenset(f"gains.{name}.{entry.name}" for name in ("ramp", "hold") for entry in fields(GainsConfig))
 
 
 def gains_config(config: TableConfig, gains: Gains) -> GainsConfig:
@@ -15,34 +23,37 @@ def gains_config(config: TableConfig, gains: Gains) -> GainsConfig:
     return GainsConfig(proportional, proportional * tick_s / integral, derivative * tick_s / proportional)
 
 
-def gains_toml(sets: dict[str, GainsConfig]) -> str:
-    """Return the sets as `load_config` reads them; all digits, so that the registers come out the same."""
-    lines = ["# Tuned gain sets, for --config."]
-    for name, gains in sets.items():
-        lines += [
-            "",
-            f"[gains.{name}]",
-            f"proportional_duty_s_deg = {gains.proportional_duty_s_deg!r}",
-            f"integral_time_s = {gains.integral_time_s!r}",
-            f"derivative_time_s = {gains.derivative_time_s!r}",
-        ]
-    return "\n".join(lines) + "\n"
+def gains_toml(config: TableConfig) -> str:
+    """Return a table and its gain sets as `load_config` reads them; all digits, so the registers come out the same."""
+    return config_toml(config, _COMMENT, always=_KEYS)
 
 
-def gains_header(sets: dict[str, Gains]) -> str:
+def gains_header(config: TableConfig, sets: dict[str, Gains]) -> str:
     """Return the sets as a C header: integers, in PWM steps for a speed error of one count a window."""
+    control = config.control
     lines = [
         "/* Tuned gain sets of the rotary table, in the firmware's number format:",
-        "   PWM steps for a speed error of one count a window. */",
+        "   PWM steps for a speed error of one count a window, each tick",
+        "       u = PROPORTIONAL e + sum of INTEGRAL e - DERIVATIVE (change of the measured speed).",
+        "   They hold for this tick, window and PWM; each fits an int32_t. */",
         "#ifndef TABLE_GAINS_H",
         "#define TABLE_GAINS_H",
+        "",
+        *_macros(
+            {
+                "GAINS_TICK_HZ": control.tick_hz,
+                "GAINS_SPEED_WINDOW_TICKS": control.speed_window_ticks,
+                "GAINS_DUTY_MAX": config.driver.duty_max,
+            }
+        ),
         "",
         f"#define GAIN_FRACTION_BITS          {GAIN_BITS}  /* proportional and derivative gain */",
         f"#define INTEGRAL_GAIN_FRACTION_BITS {INTEGRAL_GAIN_BITS}  /* integral gain, a tick */",
     ]
     for name, gains in sets.items():
-        lines.append("")
-        for key, value in gains._asdict().items():
-            macro = f"GAINS_{name.upper()}_{key.upper()}"
-            lines.append(f"#define {macro:<27} {value}L")
+        lines += ["", *_macros({f"GAINS_{name.upper()}_{key.upper()}": gain for key, gain in gains._asdict().items()})]
     return "\n".join([*lines, "", "#endif", ""])
+
+
+def _macros(values: dict[str, int]) -> list[str]:
+    return [f"#define {name:<27} {value}L" for name, value in values.items()]

@@ -136,7 +136,9 @@ def test_the_measured_lag_on_a_ramp_is_that_of_the_loop_walked_tick_by_tick() ->
 
     found = loop_figures(Loops.of([CONFIG], 512), np.array([gains]))
 
-    assert found.ramp_lag_s[0] == pytest.approx(0.4 - answer_to_a_ramp[-1] + window_s / 2, abs=1.1 / CONFIG.control.tick_hz)
+    assert found.ramp_lag_s[0] == pytest.approx(
+        0.4 - answer_to_a_ramp[-1] + window_s / 2, abs=1.1 / CONFIG.control.tick_hz
+    )
 
 
 def test_the_bandwidth_does_not_depend_on_the_grid() -> None:
