@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from emulator.config import TableConfig
+from tools.config_file import config_toml
 from tools.html_report import BLUE, ORANGE, figure_block, heading, new_figure, page, paragraph, svg_of, table_block
 from tools.identification.identify_table import Constant, Identified
 from tools.identification.parameters import PARAMETERS
@@ -19,13 +20,11 @@ def verdict(constant: Constant) -> str:
 
 
 def table_toml(found: Identified) -> str:
-    """Return the constants that were estimated, as a file for `--config`."""
-    lines = ["# Identified from a recording. Torques and inertias hold for the motor resistance that was assumed."]
-    lines += [f"# {verdict(constant)}" for constant in found.constants]
-    for section in dict.fromkeys(parameter.section for parameter in PARAMETERS):
-        lines += ["", f"[{section}]"]
-        lines += [f"{each.key} = {each.value(found.config):.6g}" for each in PARAMETERS if each.section == section]
-    return "\n".join(lines) + "\n"
+    """Return the identified table, with what was known of it beforehand, as a file for `--config`."""
+    lines = ["Identified from a recording. Torques and inertias hold for the motor resistance that was assumed."]
+    lines += [verdict(constant) for constant in found.constants]
+    estimated = frozenset(f"{parameter.section}.{parameter.key}" for parameter in PARAMETERS)
+    return config_toml(found.config, "\n".join(lines), always=estimated)
 
 
 def fit_report(found: Identified, assumed: TableConfig, source: str) -> str:
