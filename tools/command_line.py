@@ -29,7 +29,9 @@ def ended(name: str, work: Callable[[], int], *expected: type[Exception]) -> int
         _give_up_stdout()
         print(f"{name}: nobody reads what it prints any more", file=sys.stderr)
         return _BAD_INPUT
-    except (*expected, OSError) as error:
+    except Exception as error:
+        if not isinstance(error, (*expected, OSError)):
+            raise
         _give_up_stdout()
         print(f"{name}: {error}", file=sys.stderr)
         return _BAD_INPUT

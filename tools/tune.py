@@ -19,7 +19,8 @@ from tools.command_line import check_folder, ended
 from tools.progress import Progress
 from tools.tuning.bounds import Limits
 from tools.tuning.gain_files import gains_header, gains_toml
-from tools.tuning.tune_report import plots, tune_report
+from tools.tuning.tune_plots import plots
+from tools.tuning.tune_report import tune_report
 from tools.tuning.tuned_table import Tuning, TuningError, tune
 
 

@@ -1,246 +1,54 @@
-"""Checks of gain sets on the compiled emulator, each beside what the linear model foretells."""
+"""All checks of a table with its gain sets on the compiled emulator, and why some differ from the linear model."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
-import control
-import numpy as np
-from numpy.typing import NDArray
-
 from emulator.config import TableConfig
-from emulator.firmware import IDLE
-from emulator.pid import fixed_gains
-from tools.emulated import Answer, Array, Load, Motion, emulate
-from tools.tuning.linear_model import Teeth, closed_loop, load_ratio, moving_friction_Nm
-from tools.tuning.loop_figures import SETTLED_SHARE
+from tools.tuning.check import Check, Figure
+from tools.tuning.linear_checks import load_step, ramp, step
+from tools.tuning.nonlinear_checks import creep, reversal, small_moves
 
-_STEP_FROM, _STEP_TO, _RAMP_TO, _CREEP = 0.25, 0.375, 0.5, 0.005
-"""Speeds, as shares of the greatest one."""
-_LOAD_STEP = 0.0078
-"""Share of the torque at standstill: 0.29 Nm for the default table."""
-_FAR_S = 100.0
-_LEAST_RAMP_S = 0.1
-_LONGEST_SETTLING_S = 10.0
-_SMALL_MOVES_DEG = (0.1, 0.2, 0.5, 1.0, 3.0)
-_STARTS = 64
-"""Places between two counts from which steps are made; their mean shows the answer without the counts' ripple."""
+AGREES_SHARE = 0.2
+"""Beyond this share of what the model foretells, a difference is explained."""
+
+_CHECKS: tuple[Callable[[TableConfig, int], Check], ...] = (ramp, step, load_step, small_moves, reversal, creep)
 
 
-class Curve(NamedTuple):
-    """An answer in time: of the emulator, and where the linear model has one, of that."""
+class Difference(NamedTuple):
+    """A figure in which emulator and model differ, and what it is on the emulator without some of its effects."""
 
-    time_s: Array
-    emulator: Array
-    model: Array | None
-
-
-class Figure(NamedTuple):
-    """One figure of merit, the less the better."""
-
-    title: str
-    unit: str
-    emulator: float
-    model: float | None
-
-
-class Check(NamedTuple):
-    """A run and what it shows."""
-
-    name: str
-    ordinate: str
-    curve: Curve
-    figures: tuple[Figure, ...]
+    figure: Figure
+    without: dict[str, float]
 
 
 def all_checks(config: TableConfig, seed: int) -> list[Check]:
     """Return all checks of a table with its gain sets."""
-    checks: list[Callable[[TableConfig, int], Check]] = [ramp, step, load_step, small_moves, reversal, creep]
-    return [check(config, seed) for check in checks]
+    return [check(config, seed) for check in _CHECKS]
 
 
-def ramp(config: TableConfig, seed: int) -> Check:
-    """Speed up at the greatest acceleration to half the greatest speed, and keep it."""
-    speed, acceleration, ramp_s = _ramp(config)
-    start_s = 0.1
-    answer = emulate(
-        config, [Motion(start_s, _far_deg(config), speed, acceleration)], start_s + ramp_s + 0.5, seed=seed
-    )
-    reference = answer.reference_speed_deg_s
-    gains = fixed_gains(config, config.gains.ramp)
-    loop = closed_loop(config, Teeth.DRIVING, gains)
-    moving = (answer.time_s > start_s).astype(float)
-    outputs = _linear(loop, answer.time_s, reference, moving_friction_Nm(config) * moving)
-    error, foretold = reference - answer.measured_deg_s, reference - outputs[1]
-    late = (answer.time_s > start_s + 0.5 * ramp_s) & (answer.time_s <= start_s + ramp_s)
-    steady = answer.time_s > start_s + ramp_s + 0.3
-    lag = answer.reference_deg - answer.encoder_deg
-    linear_lag = np.cumsum(reference - outputs[0]) / config.control.tick_hz
-    return Check(
-        "ramp",
-        "speed error, deg/s",
-        Curve(answer.time_s, error, foretold),
-        (
-            Figure(f"speed lag on a ramp of {acceleration:.3g} deg/s2", "deg/s", *_means(error, foretold, late)),
-            Figure(f"encoder behind the reference at {speed:.3g} deg/s", "deg", *_means(lag, linear_lag, steady)),
-        ),
-    )
+def differs(figure: Figure) -> bool:
+    """Return whether the emulator is not where the model foretells it."""
+    return figure.model is not None and abs(figure.emulator - figure.model) > AGREES_SHARE * abs(figure.model)
 
 
-def step(config: TableConfig, seed: int) -> Check:
-    """Let the reference jump from one speed to another, under the constant-speed set."""
-    low, high = (share * config.limits.speed_deg_s for share in (_STEP_FROM, _STEP_TO))
-    height, at_s = high - low, _cruising_s(config)
-    in_one_tick = 2.0 * height * config.control.tick_hz
-    motions = [Motion(0.1, _far_deg(config), low, _ramp(config)[1]), Motion(at_s, _far_deg(config), high, in_one_tick)]
-    time_s, speed_deg_s = _mean_speed(config, motions, at_s + 0.3, [], seed)
-    model = _after_step(config, time_s, at_s, height, 0.0)
-    seen = speed_deg_s - low
-    after = time_s > at_s
-    overshoot = [max(0.0, float(100.0 * (curve[after].max() / height - 1.0))) for curve in (seen, model)]
-    settling = [_settling_ms(time_s[after] - at_s, curve[after] - height, height) for curve in (seen, model)]
-    window = time_s > at_s - 0.02
-    return Check(
-        f"step of the reference from {low:.3g} to {high:.3g} deg/s",
-        "speed gained by the table, deg/s",
-        Curve(time_s[window] - at_s, seen[window], model[window]),
-        (Figure("overshoot", "%", *overshoot), Figure("settling to 10 % after a step", "ms", *settling)),
-    )
+def differences(config: TableConfig, seed: int, checks: list[Check]) -> tuple[Difference, ...]:
+    """Return the figures in which emulator and model differ, each as it is on tables that lack what the model lacks."""
+    found = []
+    for run, check in zip(_CHECKS, checks, strict=True):
+        if not any(map(differs, check.figures)):
+            continue
+        others = {effect: run(table, seed).figures for effect, table in _without(config).items()}
+        for index, figure in enumerate(check.figures):
+            if differs(figure):
+                found.append(Difference(figure, {effect: each[index].emulator for effect, each in others.items()}))
+    return tuple(found)
 
 
-def load_step(config: TableConfig, seed: int) -> Check:
-    """Load the table while it turns at a constant speed."""
-    speed, load_Nm, at_s = _STEP_FROM * config.limits.speed_deg_s, load_step_Nm(config), _cruising_s(config)
-    motions = [Motion(0.1, _far_deg(config), speed, _ramp(config)[1])]
-    time_s, speed_deg_s = _mean_speed(config, motions, at_s + 0.3, [Load(at_s, load_Nm)], seed)
-    model = _after_step(config, time_s, at_s, 0.0, load_Nm)
-    seen = speed_deg_s - speed
-    after = time_s > at_s
-    peaks = [float(-curve[after].min()) for curve in (seen, model)]
-    settling = [_settling_ms(time_s[after] - at_s, curve[after], peaks[1]) for curve in (seen, model)]
-    window = time_s > at_s - 0.02
-    return Check(
-        f"load step of {load_Nm:g} Nm",
-        "speed gained by the table, deg/s",
-        Curve(time_s[window] - at_s, seen[window], model[window]),
-        (Figure("peak after the load step", "deg/s", *peaks), Figure("settling to 10 % of it", "ms", *settling)),
-    )
-
-
-def load_step_Nm(config: TableConfig) -> float:
-    """Return the load that is put on the table: a small share of what the motor can drive."""
-    at_motor_Nm = config.motor.torque_constant_Nm_A * config.driver.supply_V / config.motor.resistance_ohm
-    return float(f"{_LOAD_STEP * at_motor_Nm / load_ratio(config, Teeth.DRIVING):.2g}")
-
-
-def small_moves(config: TableConfig, seed: int) -> Check:
-    """Make small moves from rest, there and back, each with time enough to come to rest."""
-    speed, acceleration = config.power_on.speed_deg_s, config.power_on.acceleration_deg_s2
-    longest_deg = 2.0 * max(_SMALL_MOVES_DEG)
-    pause_s = longest_deg / speed + speed / acceleration + min(config.protection.settling_time_s, _LONGEST_SETTLING_S)
-    targets = [sign * angle for angle in _SMALL_MOVES_DEG for sign in (1.0, -1.0)]
-    motions = [Motion(0.1 + index * pause_s, angle, speed, acceleration) for index, angle in enumerate(targets)]
-    answer = emulate(config, motions, 0.1 + len(targets) * pause_s, seed=seed)
-    ends = np.round((0.1 + np.arange(1, len(targets) + 1) * pause_s) * config.control.tick_hz).astype(int) - 2
-    misses = np.abs(answer.encoder_deg[ends] - targets)
-    arrival_s = _arrival_s(answer, [motion.time_s for motion in motions], pause_s)
-    return Check(
-        "small moves",
-        "encoder, deg",
-        Curve(answer.time_s, answer.encoder_deg, None),
-        (
-            Figure("greatest distance from the target at rest", "deg", float(misses.max()), None),
-            Figure(f"longest move of up to {longest_deg:g} deg", "s", arrival_s, None),
-        ),
-    )
-
-
-def reversal(config: TableConfig, seed: int) -> Check:
-    """Turn back at speed, through the backlash."""
-    speed, acceleration, ramp_s = _ramp(config)
-    at_s = 0.6 + ramp_s
-    motions = [Motion(0.1, _far_deg(config), speed, acceleration), Motion(at_s, -_far_deg(config), speed, acceleration)]
-    answer = emulate(config, motions, at_s + 2.0 * ramp_s + 0.6, seed=seed)
-    error = answer.reference_deg - answer.encoder_deg
-    window = answer.time_s > at_s - 0.1
-    return Check(
-        "reversal through the backlash",
-        "encoder behind, deg",
-        Curve(answer.time_s[window], error[window], None),
-        (Figure("most that the encoder is behind in a reversal", "deg", float(np.abs(error[window]).max()), None),),
-    )
-
-
-def creep(config: TableConfig, seed: int) -> Check:
-    """Creep, where stiction and the quantum of the speed weigh most."""
-    speed = _CREEP * config.limits.speed_deg_s
-    answer = emulate(config, [Motion(0.1, _far_deg(config), speed, 5.0 * speed)], 4.0, seed=seed)
-    late = answer.time_s > 2.0
-    ripple = float(answer.true_speed_deg_s[late].std())
-    return Check(
-        f"creeping at {speed:.3g} deg/s",
-        "speed of the table, deg/s",
-        Curve(answer.time_s, answer.true_speed_deg_s, None),
-        (Figure("ripple of the speed at creep", "deg/s", ripple, None),),
-    )
-
-
-def _ramp(config: TableConfig) -> tuple[float, float, float]:
-    """Return speed, acceleration and duration of a ramp that lasts long enough to be seen."""
-    speed = _RAMP_TO * config.limits.speed_deg_s
-    acceleration = min(config.limits.acceleration_deg_s2, speed / _LEAST_RAMP_S)
-    return speed, acceleration, speed / acceleration
-
-
-def _far_deg(config: TableConfig) -> float:
-    """Return a target that no run of a check gets to."""
-    return _FAR_S * config.limits.speed_deg_s
-
-
-def _cruising_s(config: TableConfig) -> float:
-    """Return when a table that was started at 0.1 s has long been at the lower speed of a step."""
-    return 0.9 + _STEP_FROM * config.limits.speed_deg_s / _ramp(config)[1]
-
-
-def _mean_speed(
-    config: TableConfig, motions: list[Motion], duration_s: float, loads: list[Load], seed: int
-) -> tuple[Array, Array]:
-    """Return times, and the table's speed as the mean of runs from several starts."""
-    answers = [emulate(config, motions, duration_s, loads, seed + start) for start in range(_STARTS)]
-    return answers[0].time_s, np.mean([answer.true_speed_deg_s for answer in answers], axis=0)
-
-
-def _after_step(config: TableConfig, time_s: Array, at_s: float, reference_deg_s: float, load_Nm: float) -> Array:
-    """Return the linear answer of the speed to a step in the constant-speed set."""
-    after = (time_s > at_s).astype(float)
-    loop = closed_loop(config, Teeth.DRIVING, fixed_gains(config, config.gains.hold))
-    # A load that acts in a tick is an input at its start, a sample before its end.
-    load = np.append((load_Nm * after)[1:], load_Nm)
-    result: Array = _linear(loop, time_s, reference_deg_s * after, load)[0]
-    return result
-
-
-def _linear(loop: control.StateSpace, time_s: Array, reference_deg_s: Array, load_Nm: Array) -> Array:
-    """Return speed, measured speed and duty of the closed loop."""
-    response = control.forced_response(loop, time_s, np.vstack([reference_deg_s, load_Nm]))
-    outputs: Array = response.outputs
-    return outputs
-
-
-def _means(seen: Array, foretold: Array, where: NDArray[np.bool_]) -> tuple[float, float]:
-    return float(seen[where].mean()), float(foretold[where].mean())
-
-
-def _settling_ms(time_s: Array, deviation: Array, height: float) -> float:
-    """Return when the deviation last leaves a band of a tenth of the height."""
-    outside = np.flatnonzero(np.abs(deviation) > SETTLED_SHARE * height)
-    return float(1e3 * time_s[outside[-1]]) if len(outside) else 0.0
-
-
-def _arrival_s(answer: Answer, starts_s: list[float], pause_s: float) -> float:
-    """Return the longest time from a command until the drive is off again."""
-    longest = 0.0
-    for start_s in starts_s:
-        during = (answer.time_s > start_s) & (answer.time_s < start_s + pause_s)
-        busy = answer.time_s[during & (answer.motion != IDLE)]
-        longest = max(longest, float(busy[-1] - start_s) if len(busy) else 0.0)
-    return longest
+def _without(config: TableConfig) -> dict[str, TableConfig]:
+    friction, gears = replace(config.friction, stiction_ratio=1.0), replace(config.gears, backlash_arcmin=0.0)
+    return {
+        "stiction": replace(config, friction=friction),
+        "backlash": replace(config, gears=gears),
+        "both": replace(config, friction=friction, gears=gears),
+    }

@@ -10,7 +10,8 @@ from emulator.config import TableConfig
 from emulator.pid import Gains, fixed_gains
 from tools.emulated import with_gains
 from tools.tuning.bounds import Bound, Limits
-from tools.tuning.checks import Check, all_checks
+from tools.tuning.check import Check
+from tools.tuning.checks import Difference, all_checks, differences
 from tools.tuning.gain_design import LEAST_LAG, LEAST_LOAD_PEAK, Design, Objective, Relaxation, design, relaxations
 from tools.tuning.gain_files import gains_config
 from tools.tuning.loop_figures import LoopFigures, Loops, loop_figures
@@ -40,6 +41,7 @@ class Tuning(NamedTuple):
     after: TableConfig
     sets: dict[str, TunedSet]  # "ramp" and "hold"
     checks: tuple[tuple[Check, Check], ...]  # before and after
+    differences: tuple[Difference, ...]  # of the tuned table from the model
     plants: int
     spread: float
 
@@ -77,9 +79,12 @@ def tune(
     progress(0.5)
     checks_before = all_checks(config, seed)
     progress(0.8)
-    checks = tuple(zip(checks_before, all_checks(after, seed), strict=True))
+    checks_after = all_checks(after, seed)
+    progress(0.9)
+    explained = differences(after, seed, checks_after)
     progress(1.0)
-    return Tuning(config, after, sets, checks, plants, spread)
+    pairs = tuple(zip(checks_before, checks_after, strict=True))
+    return Tuning(config, after, sets, pairs, explained, plants, spread)
 
 
 def grid_size(config: TableConfig, limits: Limits) -> int:

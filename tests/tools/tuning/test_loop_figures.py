@@ -47,7 +47,8 @@ def real_gains(config: TableConfig, gains: Gains) -> Array:
     """Registers as duty per deg/s: 12, 16 and 12 fraction bits, PWM steps for one count a window."""
     count_deg = 360.0 / (4 * config.encoder.lines * config.gears.ratio)
     unit = (2**config.driver.pwm_bits - 1) * count_deg * config.control.tick_hz / config.control.speed_window_ticks
-    return np.array([gains.proportional / 4096, gains.integral / 65536, gains.derivative / 4096]) / unit
+    answer: Array = np.array([gains.proportional / 4096, gains.integral / 65536, gains.derivative / 4096]) / unit
+    return answer
 
 
 def loop_response(config: TableConfig, state: str, gains: Gains, frequency_hz: Array) -> NDArray[np.complex128]:

@@ -1,0 +1,47 @@
+"""A check on the emulator: what a run shows, beside what the linear model foretells, and the motions that all share."""
+
+from typing import NamedTuple
+
+from emulator.config import TableConfig
+from tools.emulated import Array
+
+_FAR_S, _RAMP_TO = 100.0, 0.5
+_LEAST_RAMP_S = 0.1
+
+
+class Curve(NamedTuple):
+    """An answer in time: of the emulator, and where the linear model has one, of that."""
+
+    time_s: Array
+    emulator: Array
+    model: Array | None
+
+
+class Figure(NamedTuple):
+    """One figure of merit, the less the better."""
+
+    title: str
+    unit: str
+    emulator: float
+    model: float | None
+
+
+class Check(NamedTuple):
+    """A run and what it shows."""
+
+    name: str
+    ordinate: str
+    curve: Curve
+    figures: tuple[Figure, ...]
+
+
+def greatest_ramp(config: TableConfig) -> tuple[float, float, float]:
+    """Return speed, acceleration and duration of a ramp that lasts long enough to be seen."""
+    speed = _RAMP_TO * config.limits.speed_deg_s
+    acceleration = min(config.limits.acceleration_deg_s2, speed / _LEAST_RAMP_S)
+    return speed, acceleration, speed / acceleration
+
+
+def far_deg(config: TableConfig) -> float:
+    """Return a target that no run of a check gets to."""
+    return _FAR_S * config.limits.speed_deg_s

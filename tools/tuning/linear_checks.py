@@ -1,0 +1,134 @@
+"""Checks that the linear model foretells: a ramp, a step of the reference, a step of the load."""
+
+import control
+import numpy as np
+from numpy.typing import NDArray
+
+from emulator.config import TableConfig
+from emulator.pid import fixed_gains
+from tools.emulated import Array, Load, Motion, emulate
+from tools.tuning.check import Check, Curve, Figure, far_deg, greatest_ramp
+from tools.tuning.linear_model import Teeth, closed_loop, load_ratio, moving_friction_Nm
+from tools.tuning.loop_figures import SETTLED_SHARE
+
+_STEP_FROM, _STEP_TO = 0.25, 0.375
+"""Speeds, as shares of the greatest one."""
+_LOAD_STEP = 0.0078
+"""Share of the torque at standstill: 0.29 Nm for the default table."""
+_STARTS = 64
+"""Places between two counts from which steps are made; their mean shows the answer without the counts' ripple."""
+
+
+def ramp(config: TableConfig, seed: int) -> Check:
+    """Speed up at the greatest acceleration to half the greatest speed, and keep it."""
+    speed, acceleration, ramp_s = greatest_ramp(config)
+    start_s = 0.1
+    answer = emulate(config, [Motion(start_s, far_deg(config), speed, acceleration)], start_s + ramp_s + 0.5, seed=seed)
+    reference = answer.reference_speed_deg_s
+    gains = fixed_gains(config, config.gains.ramp)
+    loop = closed_loop(config, Teeth.DRIVING, gains)
+    moving = (answer.time_s > start_s).astype(float)
+    outputs = _linear(loop, answer.time_s, reference, moving_friction_Nm(config) * moving)
+    error, foretold = reference - answer.measured_deg_s, reference - outputs[1]
+    late = (answer.time_s > start_s + 0.5 * ramp_s) & (answer.time_s <= start_s + ramp_s)
+    steady = answer.time_s > start_s + ramp_s + 0.3
+    lag = answer.reference_deg - answer.encoder_deg
+    linear_lag = np.cumsum(reference - outputs[0]) / config.control.tick_hz
+    return Check(
+        "ramp",
+        "speed error, deg/s",
+        Curve(answer.time_s, error, foretold),
+        (
+            Figure(f"speed lag on a ramp of {acceleration:.3g} deg/s2", "deg/s", *_means(error, foretold, late)),
+            Figure(f"encoder behind the reference at {speed:.3g} deg/s", "deg", *_means(lag, linear_lag, steady)),
+        ),
+    )
+
+
+def step(config: TableConfig, seed: int) -> Check:
+    """Let the reference jump from one speed to another, under the constant-speed set."""
+    low, high = (share * config.limits.speed_deg_s for share in (_STEP_FROM, _STEP_TO))
+    height, at_s = high - low, _cruising_s(config)
+    in_one_tick = 2.0 * height * config.control.tick_hz
+    motions = [
+        Motion(0.1, far_deg(config), low, greatest_ramp(config)[1]),
+        Motion(at_s, far_deg(config), high, in_one_tick),
+    ]
+    time_s, speed_deg_s = _mean_speed(config, motions, at_s + 0.3, [], seed)
+    model = _after_step(config, time_s, at_s, height, 0.0)
+    seen = speed_deg_s - low
+    after = time_s > at_s
+    overshoot = [max(0.0, float(100.0 * (curve[after].max() / height - 1.0))) for curve in (seen, model)]
+    settling = [_settling_ms(time_s[after] - at_s, curve[after] - height, height) for curve in (seen, model)]
+    window = time_s > at_s - 0.02
+    return Check(
+        f"step of the reference from {low:.3g} to {high:.3g} deg/s",
+        "speed gained by the table, deg/s",
+        Curve(time_s[window] - at_s, seen[window], model[window]),
+        (Figure("overshoot", "%", *overshoot), Figure("settling to 10 % after a step", "ms", *settling)),
+    )
+
+
+def load_step(config: TableConfig, seed: int) -> Check:
+    """Load the table while it turns at a constant speed."""
+    speed, load_Nm, at_s = _STEP_FROM * config.limits.speed_deg_s, load_step_Nm(config), _cruising_s(config)
+    motions = [Motion(0.1, far_deg(config), speed, greatest_ramp(config)[1])]
+    time_s, speed_deg_s = _mean_speed(config, motions, at_s + 0.3, [Load(at_s, load_Nm)], seed)
+    model = _after_step(config, time_s, at_s, 0.0, load_Nm)
+    seen = speed_deg_s - speed
+    after = time_s > at_s
+    peaks = [float(-curve[after].min()) for curve in (seen, model)]
+    settling = [_settling_ms(time_s[after] - at_s, curve[after], peaks[1]) for curve in (seen, model)]
+    window = time_s > at_s - 0.02
+    return Check(
+        f"load step of {load_Nm:g} Nm",
+        "speed gained by the table, deg/s",
+        Curve(time_s[window] - at_s, seen[window], model[window]),
+        (Figure("peak after the load step", "deg/s", *peaks), Figure("settling to 10 % of it", "ms", *settling)),
+    )
+
+
+def load_step_Nm(config: TableConfig) -> float:
+    """Return the load that is put on the table: a small share of what the motor can drive."""
+    at_motor_Nm = config.motor.torque_constant_Nm_A * config.driver.supply_V / config.motor.resistance_ohm
+    return float(f"{_LOAD_STEP * at_motor_Nm / load_ratio(config, Teeth.DRIVING):.2g}")
+
+
+def _cruising_s(config: TableConfig) -> float:
+    """Return when a table that was started at 0.1 s has long been at the lower speed of a step."""
+    return 0.9 + _STEP_FROM * config.limits.speed_deg_s / greatest_ramp(config)[1]
+
+
+def _mean_speed(
+    config: TableConfig, motions: list[Motion], duration_s: float, loads: list[Load], seed: int
+) -> tuple[Array, Array]:
+    """Return times, and the table's speed as the mean of runs from several starts."""
+    answers = [emulate(config, motions, duration_s, loads, seed + start) for start in range(_STARTS)]
+    return answers[0].time_s, np.mean([answer.true_speed_deg_s for answer in answers], axis=0)
+
+
+def _after_step(config: TableConfig, time_s: Array, at_s: float, reference_deg_s: float, load_Nm: float) -> Array:
+    """Return the linear answer of the speed to a step in the constant-speed set."""
+    after = (time_s > at_s).astype(float)
+    loop = closed_loop(config, Teeth.DRIVING, fixed_gains(config, config.gains.hold))
+    # A load that acts in a tick is an input at its start, a sample before its end.
+    load = np.append((load_Nm * after)[1:], load_Nm)
+    result: Array = _linear(loop, time_s, reference_deg_s * after, load)[0]
+    return result
+
+
+def _linear(loop: control.StateSpace, time_s: Array, reference_deg_s: Array, load_Nm: Array) -> Array:
+    """Return speed, measured speed and duty of the closed loop."""
+    response = control.forced_response(loop, time_s, np.vstack([reference_deg_s, load_Nm]))
+    outputs: Array = response.outputs
+    return outputs
+
+
+def _means(seen: Array, foretold: Array, where: NDArray[np.bool_]) -> tuple[float, float]:
+    return float(seen[where].mean()), float(foretold[where].mean())
+
+
+def _settling_ms(time_s: Array, deviation: Array, height: float) -> float:
+    """Return when the deviation last leaves a band of a tenth of the height."""
+    outside = np.flatnonzero(np.abs(deviation) > SETTLED_SHARE * height)
+    return float(1e3 * time_s[outside[-1]]) if len(outside) else 0.0

@@ -1,0 +1,108 @@
+"""The figures of a tuning's report: answers in time, Bode and Nyquist plots, the spread of Ms."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
+
+from emulator.pid import Gains
+from tools.html_report import BLUE, GREEN, GREY, ORANGE, RED, new_figure, svg_of
+from tools.tuning.check import Check
+from tools.tuning.frequency_response import Complex
+from tools.tuning.linear_model import Teeth, duty_gains
+from tools.tuning.loop_figures import Loops
+from tools.tuning.margins import controller
+from tools.tuning.tuned_table import Tuning
+
+_PLOT_GRID = 4096
+_LINES: dict[Teeth, Any] = {  # told apart without colour too, and where one lies upon the other
+    Teeth.DRIVING: {"color": BLUE, "linewidth": 2.4},
+    Teeth.OVERHAULING: {"color": GREEN, "linestyle": "--"},
+    Teeth.FREE: {"color": ORANGE, "linestyle": ":", "linewidth": 2.0},
+}
+
+
+def plots(tuning: Tuning) -> dict[str, str]:
+    """Return the report's figures as SVG, by name."""
+    drawings = {"answers": _answers, "bode": _bode, "nyquist": _nyquist, "spread": _spread_figure}
+    return {name: svg_of(draw(tuning)) for name, draw in drawings.items()}
+
+
+def _answers(tuning: Tuning) -> Drawing:
+    drawing = new_figure(10.5, 8.6, rows=3, columns=2)
+    for axes, (before, after) in zip(drawing.axes, tuning.checks, strict=True):
+        _draw_check(axes, before, after)
+    drawing.axes[0].legend(loc="best")
+    return drawing
+
+
+def _draw_check(axes: Axes, before: Check, after: Check) -> None:
+    axes.plot(before.curve.time_s, before.curve.emulator, color=GREY, linewidth=1.0, label="emulator, former gains")
+    axes.plot(after.curve.time_s, after.curve.emulator, color=BLUE, linewidth=1.2, label="emulator, tuned gains")
+    if after.curve.model is not None:
+        axes.plot(
+            after.curve.time_s,
+            after.curve.model,
+            color=ORANGE,
+            linewidth=1.3,
+            linestyle="--",
+            label="model, tuned gains",
+        )
+    axes.set_title(after.name)
+    axes.set_ylabel(after.ordinate)
+    axes.set_xlabel("time, s")
+    if "step" in after.name:
+        axes.set_xlim(-0.02, 0.15)
+
+
+def _loops(tuning: Tuning, gains: Gains) -> tuple[Loops, dict[Teeth, Complex]]:
+    loops = Loops.of([tuning.before], _PLOT_GRID)
+    regulator = controller(duty_gains(tuning.before, np.array([gains])), loops.z)
+    return loops, {teeth: (regulator.by_measured * plant.measured_by_duty)[0] for teeth, plant in loops.plants.items()}
+
+
+def _bode(tuning: Tuning) -> Drawing:
+    drawing = new_figure(10.5, 5.4, rows=2, columns=2)
+    for column, tuned in enumerate(tuning.sets.values()):
+        loops, responses = _loops(tuning, tuned.design.gains)
+        size, phase = drawing.axes[column], drawing.axes[column + 2]
+        for teeth, response in responses.items():
+            size.semilogx(loops.frequency_hz, 20.0 * np.log10(np.abs(response)), **_LINES[teeth], label=str(teeth))
+            phase.semilogx(loops.frequency_hz, np.degrees(np.unwrap(np.angle(response))), **_LINES[teeth])
+        size.axhline(0.0, color=GREY, linewidth=0.8)
+        phase.axhline(-180.0, color=GREY, linewidth=0.8)
+        size.set(title=tuned.title, ylabel="gain, dB", ylim=(-40, 40))
+        phase.set(ylabel="phase, deg", xlabel="frequency, Hz", ylim=(-540, 0))
+        size.legend(loc="lower left")
+    return drawing
+
+
+def _nyquist(tuning: Tuning) -> Drawing:
+    drawing = new_figure(10.5, 5.2, columns=2)
+    turn = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 200))
+    for axes, tuned in zip(drawing.axes, tuning.sets.values(), strict=True):
+        _, responses = _loops(tuning, tuned.design.gains)
+        for teeth, response in responses.items():
+            axes.plot(response.real, response.imag, **_LINES[teeth], label=str(teeth))
+        limit = next(bound.limit for bound in tuned.design.bounds if bound.figure == "sensitivity_peak")
+        circle = -1.0 + turn / limit
+        axes.fill(circle.real, circle.imag, color=RED, alpha=0.12, linewidth=0)
+        axes.plot(circle.real, circle.imag, color=RED, linewidth=1.0, label=f"Ms = {limit:g}")
+        axes.plot(-1.0, 0.0, "+", color=RED)
+        axes.set(
+            title=tuned.title, xlim=(-2.0, 1.0), ylim=(-2.0, 1.0), aspect="equal", xlabel="real", ylabel="imaginary"
+        )
+        axes.legend(loc="lower right")
+    return drawing
+
+
+def _spread_figure(tuning: Tuning) -> Drawing:
+    drawing = new_figure(10.5, 2.7, columns=2)
+    for axes, tuned in zip(drawing.axes, tuning.sets.values(), strict=True):
+        axes.hist(tuned.spread.figures.sensitivity_peak, bins=40, color=BLUE, alpha=0.85)
+        axes.axvline(
+            next(bound.limit for bound in tuned.design.bounds if bound.figure == "sensitivity_peak"), color=RED
+        )
+        axes.set(title=tuned.title, xlabel="Ms", ylabel="tables")
+    return drawing
