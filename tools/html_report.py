@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
 from html import escape
 from typing import Any
 
@@ -42,9 +43,14 @@ pre { background: #f5f6f8; padding: .7em 1em; overflow-x: auto; }
 """
 
 
+def report_style() -> AbstractContextManager[None]:
+    """Return the report's style, to be entered while figures are drawn."""
+    return mpl.rc_context(_SETTINGS)
+
+
 def new_figure(width_in: float, height_in: float, rows: int = 1, columns: int = 1) -> Figure:
     """Return a figure in the report's style, with its axes; draw on `figure.axes`."""
-    with mpl.rc_context(_SETTINGS):
+    with report_style():
         figure = Figure(figsize=(width_in, height_in), layout="constrained")
         figure.subplots(rows, columns)
     return figure
@@ -53,7 +59,7 @@ def new_figure(width_in: float, height_in: float, rows: int = 1, columns: int = 
 def svg_of(figure: Figure) -> str:
     """Return a figure as an SVG element."""
     buffer = io.StringIO()
-    with mpl.rc_context(_SETTINGS):
+    with report_style():
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     text = buffer.getvalue()
     return text[text.index("<svg") :]

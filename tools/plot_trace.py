@@ -73,6 +73,8 @@ def draw_trace(trace: Trace, title: str = "") -> Figure:
     current = motor.twinx()
     current.plot(trace.time_s, 1000.0 * trace.current_A, color=_CURRENT, linewidth=0.9, label="current")
     current.set_ylabel("current (mA)", color=_CURRENT)
+    motor.set_zorder(current.get_zorder() + 1.0)  # the current is the noisier: it must not hide the duty
+    motor.patch.set_visible(False)
 
     for axes in (motor, current):  # both zeros at the same height
         farthest = max(map(abs, axes.get_ylim()))
@@ -82,8 +84,8 @@ def draw_trace(trace: Trace, title: str = "") -> Figure:
         axes.spines[["top", "right"]].set_visible(False)
         axes.margins(x=0.0)
     current.spines["top"].set_visible(False)
-    speed.legend(loc="upper right", frameon=False, ncols=3)
-    position.legend(loc="upper left", frameon=False, ncols=2)
+    speed.legend(loc="upper right", edgecolor="none", ncols=3)
+    position.legend(loc="upper left", edgecolor="none", ncols=2)
     _mark_commands(speed, (position, motor), commands_of(trace))
     return figure
 

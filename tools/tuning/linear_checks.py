@@ -63,7 +63,7 @@ def step(config: TableConfig, seed: int) -> Check:
     window = time_s > at_s - 0.02
     return Check(
         f"step of the reference from {low:.3g} to {high:.3g} deg/s",
-        "speed gained by the table, deg/s",
+        "speed gained, deg/s",
         Curve(time_s[window] - at_s, seen[window], model[window]),
         (Figure("overshoot", "%", *overshoot), Figure("settling to 10 % after a step", "ms", *settling)),
     )
@@ -82,7 +82,7 @@ def load_step(config: TableConfig, seed: int) -> Check:
     window = time_s > at_s - 0.02
     return Check(
         f"load step of {load_Nm:g} Nm",
-        "speed gained by the table, deg/s",
+        "speed gained, deg/s",
         Curve(time_s[window] - at_s, seen[window], model[window]),
         (Figure("peak after the load step", "deg/s", *peaks), Figure("settling to 10 % of it", "ms", *settling)),
     )

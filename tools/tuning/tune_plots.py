@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from emulator.pid import Gains
-from tools.html_report import BLUE, GREEN, GREY, ORANGE, RED, new_figure, svg_of
+from tools.html_report import BLUE, GREEN, GREY, ORANGE, RED, new_figure, report_style, svg_of
 from tools.tuning.check import Check
 from tools.tuning.frequency_response import Complex
 from tools.tuning.linear_model import Teeth, duty_gains
@@ -26,14 +26,15 @@ _LINES: dict[Teeth, Any] = {  # told apart without colour too, and where one lie
 def plots(tuning: Tuning) -> dict[str, str]:
     """Return the report's figures as SVG, by name."""
     drawings = {"answers": _answers, "bode": _bode, "nyquist": _nyquist, "spread": _spread_figure}
-    return {name: svg_of(draw(tuning)) for name, draw in drawings.items()}
+    with report_style():
+        return {name: svg_of(draw(tuning)) for name, draw in drawings.items()}
 
 
 def _answers(tuning: Tuning) -> Drawing:
     drawing = new_figure(10.5, 8.6, rows=3, columns=2)
     for axes, (before, after) in zip(drawing.axes, tuning.checks, strict=True):
         _draw_check(axes, before, after)
-    drawing.axes[0].legend(loc="best")
+    drawing.legend(*drawing.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return drawing
 
 
@@ -64,16 +65,18 @@ def _loops(tuning: Tuning, gains: Gains) -> tuple[Loops, dict[Teeth, Complex]]:
 
 def _bode(tuning: Tuning) -> Drawing:
     drawing = new_figure(10.5, 5.4, rows=2, columns=2)
+    control = tuning.before.control
     for column, tuned in enumerate(tuning.sets.values()):
         loops, responses = _loops(tuning, tuned.design.gains)
         size, phase = drawing.axes[column], drawing.axes[column + 2]
+        seen = loops.frequency_hz < control.tick_hz / control.speed_window_ticks  # where the window has its first zero
         for teeth, response in responses.items():
             size.semilogx(loops.frequency_hz, 20.0 * np.log10(np.abs(response)), **_LINES[teeth], label=str(teeth))
-            phase.semilogx(loops.frequency_hz, np.degrees(np.unwrap(np.angle(response))), **_LINES[teeth])
+            phase.semilogx(loops.frequency_hz[seen], np.degrees(np.unwrap(np.angle(response[seen]))), **_LINES[teeth])
         size.axhline(0.0, color=GREY, linewidth=0.8)
         phase.axhline(-180.0, color=GREY, linewidth=0.8)
         size.set(title=tuned.title, ylabel="gain, dB", ylim=(-40, 40))
-        phase.set(ylabel="phase, deg", xlabel="frequency, Hz", ylim=(-540, 0))
+        phase.set(ylabel="phase, deg", xlabel="frequency, Hz", ylim=(-360, 0), xlim=size.get_xlim())
         size.legend(loc="lower left")
     return drawing
 
@@ -93,7 +96,7 @@ def _nyquist(tuning: Tuning) -> Drawing:
         axes.set(
             title=tuned.title, xlim=(-2.0, 1.0), ylim=(-2.0, 1.0), aspect="equal", xlabel="real", ylabel="imaginary"
         )
-        axes.legend(loc="lower right")
+    drawing.legend(*drawing.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return drawing
 
 

@@ -79,7 +79,11 @@ def _emulator_section(tuning: Tuning, drawings: dict[str, str]) -> list[str]:
 def _frequency_section(drawings: dict[str, str]) -> list[str]:
     return [
         heading("Frequency response"),
-        figure_block(drawings["bode"], "Bode plots of the loop, in each state of the backlash."),
+        figure_block(
+            drawings["bode"],
+            "Bode plots of the loop, in each state of the backlash; the phase up to where the speed's window hides "
+            "an oscillation.",
+        ),
         figure_block(drawings["nyquist"], "Nyquist plots; the circle is what the bound on Ms keeps free about -1."),
     ]
 
@@ -171,7 +175,9 @@ def _difference(figure: Figure) -> str:
     if figure.model is None or figure.model == 0.0:
         return ""
     share = figure.emulator / figure.model - 1.0
-    return f"{'!' if differs(figure) else ''}{100 * share:+.0f} %"
+    percent = f"{abs(100 * share):.0f} %"
+    more_or_less = percent if percent == "0 %" else f"{percent} {'more' if share > 0.0 else 'less'}"
+    return f"{'!' if differs(figure) else ''}{more_or_less}"
 
 
 def _differences(tuning: Tuning) -> list[str]:

@@ -1,0 +1,54 @@
+import re
+
+import pytest
+
+from emulator.config import load_config
+from tools.tuning.bounds import Limits
+from tools.tuning.checks import Difference
+from tools.tuning.tune_plots import plots
+from tools.tuning.tune_report import tune_report
+from tools.tuning.tuned_table import Tuning, tune
+
+
+@pytest.fixture(scope="module")
+def tuning() -> Tuning:
+    return tune(load_config(), Limits(), plants=8, spread=0.2, seed=0)
+
+
+def cells(html: str, first: str) -> list[str]:
+    """Return the texts of the row that begins with this cell."""
+    row = re.search(rf"<tr><td>{re.escape(first)}</td>(.*?)</tr>", html)
+    assert row, first
+    return [re.sub("<.*?>", "", cell) for cell in re.findall(r"<td.*?</td>", row[1])]
+
+
+def test_the_report_says_how_far_each_answer_is_from_the_model(tuning: Tuning) -> None:
+    html = tune_report(tuning, plots(tuning))
+
+    for _, after in tuning.checks:
+        for figure in after.figures:
+            *_, model, difference = cells(html, f"{figure.title}, {figure.unit}")
+            if figure.model is None:
+                assert model == difference == ""
+            else:
+                share = 100.0 * (figure.emulator / figure.model - 1.0)
+                sign = "more" if share > 0 else "less"
+                assert difference in (f"{abs(share):.0f} % {sign}", "0 %")
+
+
+def test_the_report_names_the_binding_bounds_and_repeats(tuning: Tuning) -> None:
+    html = tune_report(tuning, plots(tuning))
+
+    assert "Binding for the ramp set: Ms and noise at the PWM." in html
+    assert html == tune_report(tuning, plots(tuning))
+
+
+def test_a_difference_is_explained_in_the_report(tuning: Tuning) -> None:
+    ramp = tuning.checks[0][1].figures[0]
+    wrong = ramp._replace(model=2.0 * ramp.emulator)
+
+    explained = Difference(wrong, {"stiction": 0.125, "backlash": 0.25})
+
+    html = tune_report(tuning._replace(differences=(explained,)), plots(tuning))
+
+    assert "it would be 0.125 without stiction, 0.25 without backlash" in html
