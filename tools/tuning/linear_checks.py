@@ -8,7 +8,7 @@ from emulator.config import TableConfig
 from emulator.pid import fixed_gains
 from tools.emulated import Array, Load, Motion, emulate
 from tools.tuning.check import Check, Curve, Figure, far_deg, greatest_ramp
-from tools.tuning.linear_model import Teeth, closed_loop, load_ratio, moving_friction_Nm
+from tools.tuning.linear_model import INTEGRAL_STATE, Teeth, closed_loop, duty_gains, load_ratio, moving_friction_Nm
 from tools.tuning.loop_figures import SETTLED_SHARE
 
 _STEP_FROM, _STEP_TO = 0.25, 0.375
@@ -25,10 +25,8 @@ def ramp(config: TableConfig, seed: int) -> Check:
     start_s = 0.1
     answer = emulate(config, [Motion(start_s, far_deg(config), speed, acceleration)], start_s + ramp_s + 0.5, seed=seed)
     reference = answer.reference_speed_deg_s
-    gains = fixed_gains(config, config.gains.ramp)
-    loop = closed_loop(config, Teeth.DRIVING, gains)
     moving = (answer.time_s > start_s).astype(float)
-    outputs = _linear(loop, answer.time_s, reference, moving_friction_Nm(config) * moving)
+    outputs = _ramp_then_hold(config, answer.time_s, reference, moving_friction_Nm(config) * moving)
     error, foretold = reference - answer.measured_deg_s, reference - outputs[1]
     late = (answer.time_s > start_s + 0.5 * ramp_s) & (answer.time_s <= start_s + ramp_s)
     steady = answer.time_s > start_s + ramp_s + 0.3
@@ -114,6 +112,22 @@ def _after_step(config: TableConfig, time_s: Array, at_s: float, reference_deg_s
     # A load that acts in a tick is an input at its start, a sample before its end.
     load = np.append((load_Nm * after)[1:], load_Nm)
     result: Array = _linear(loop, time_s, reference_deg_s * after, load)[0]
+    return result
+
+
+def _ramp_then_hold(config: TableConfig, time_s: Array, reference_deg_s: Array, load_Nm: Array) -> Array:
+    """Return what `_linear` does, of a loop that changes without a bump to the constant-speed set after the ramp."""
+    ramp, hold = (fixed_gains(config, gains) for gains in (config.gains.ramp, config.gains.hold))
+    loops = [closed_loop(config, Teeth.DRIVING, gains) for gains in (ramp, hold)]
+    inputs = np.vstack([reference_deg_s, load_Nm])
+    first = control.forced_response(loops[0], time_s, inputs, return_x=True)
+    switch = int(np.flatnonzero(np.diff(reference_deg_s))[-1]) + 2  # the first tick at which the reference stays
+    state, measured = first.states[:, switch].copy(), first.outputs[1]
+    error, change = reference_deg_s[switch] - measured[switch], measured[switch] - measured[switch - 1]
+    proportional, _, derivative = duty_gains(config, ramp) - duty_gains(config, hold)
+    state[INTEGRAL_STATE] += proportional * error - derivative * change
+    second = control.forced_response(loops[1], time_s[switch:], inputs[:, switch:], state)
+    result: Array = np.hstack([first.outputs[:, :switch], second.outputs])
     return result
 
 

@@ -21,6 +21,9 @@ from emulator.pid import Gains
 
 Array = NDArray[np.float64]
 
+INTEGRAL_STATE = -3
+"""Where the regulator's integral stands in the state of `closed_loop`."""
+
 
 class Teeth(StrEnum):
     """What the motor turns, by the state of the backlash (`emulator.drive_train`)."""

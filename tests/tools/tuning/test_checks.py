@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import pytest
 
-from emulator.config import DiscConfig, MotionConfig, load_config
+from emulator.config import DiscConfig, GainsConfig, MotionConfig, load_config
 from tools.emulated import with_gains
 from tools.tuning.check import Check, Curve, Figure
 from tools.tuning.checks import all_checks, differences, differs
-from tools.tuning.linear_checks import load_step, load_step_Nm, step
+from tools.tuning.linear_checks import load_step, load_step_Nm, ramp, step
 
 CONFIG = load_config()
 CHECKS = all_checks(CONFIG, seed=1)
@@ -45,6 +45,18 @@ def test_a_table_with_other_gears_is_checked_within_its_own_speeds_and_loads(sha
 
     for figure in (*step(config, 1).figures, *load_step(config, 1).figures):
         assert figure.emulator == pytest.approx(figure.model, rel=0.25)
+
+
+def test_the_model_changes_the_gain_set_after_the_ramp_as_the_firmware_does() -> None:
+    """What the encoder stays behind is made up in part by the second set, the less the longer its integral time."""
+    config = replace(
+        with_gains(CONFIG, GainsConfig(0.01775, 0.0181, 0.0007), GainsConfig(0.0191, 0.0445, 0.0009)),
+        table=replace(CONFIG.table, inertia_kg_m2=3.0),
+        gears=replace(CONFIG.gears, backlash_arcmin=0.0),
+    )
+
+    for figure in ramp(config, 0).figures:
+        assert figure.emulator == pytest.approx(figure.model, rel=0.1)
 
 
 def test_a_difference_is_shown_without_what_the_model_lacks() -> None:
