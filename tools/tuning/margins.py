@@ -98,9 +98,11 @@ def noise_duty(
     """Return the standard deviation of the duty that the rounding of the position to counts causes.
 
     The noise enters as the difference of two counts over the window. Parseval: the variance is the mean over all
-    frequencies of the squared response.
+    frequencies of the squared response. All but the last of the grid stand for their mirror image too.
     """
     speed_by_count = (1.0 - z**-window_ticks) / window_s
     response = control.by_measured / (1.0 + control.by_measured * plant.measured_by_duty) * speed_by_count
-    result: Array = count_deg * np.sqrt(np.mean(np.abs(response) ** 2, axis=-1))
+    power = np.abs(response) ** 2
+    variance = (power.sum(axis=-1) - 0.5 * power[..., -1]) / len(z)
+    result: Array = count_deg * np.sqrt(variance)
     return result

@@ -148,3 +148,13 @@ def test_the_bandwidth_does_not_depend_on_the_grid() -> None:
     found = [float(loop_figures(Loops.of([CONFIG], size), gains).bandwidth_hz[0]) for size in (256, 512, 4096)]
 
     assert found == pytest.approx([found[-1]] * 3, rel=0.02)
+
+
+def test_the_noise_does_not_depend_on_the_grid() -> None:
+    """Without a window most of it lies at the highest frequencies, where the grid ends."""
+    config = replace(CONFIG, control=replace(CONFIG.control, speed_window_ticks=1))
+    gains = np.array([[3000, 20_000, 500]])
+
+    found = [float(loop_figures(Loops.of([config], size), gains).noise_duty[0]) for size in (256, 512, 4096)]
+
+    assert found == pytest.approx([found[-1]] * 3, rel=1e-4)

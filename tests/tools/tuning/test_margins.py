@@ -92,7 +92,7 @@ def test_the_noise_at_the_pwm_is_that_of_the_answers_to_each_count() -> None:
     plants = PlantResponse(*(response[0] for response in plant_response([CONFIG], Teeth.FREE, z)))
     found = noise_duty(controller(duty_gains(CONFIG, gains), z), plants, count_deg, window_s, window, z)
 
-    assert_allclose(found, np.sqrt(squares), rtol=0.01)
+    assert_allclose(found, np.sqrt(squares), rtol=1e-3)
 
 
 def test_a_step_answer_by_fourier_is_the_one_in_time() -> None:
