@@ -17,6 +17,7 @@ from emulator.config import TableConfig
 from emulator.drive_train import DriveState, DriveTrain
 from tools.emulated import Array, Motion, motion_rows, switched_on
 from tools.identification.recording import DriveRecording, WireRecording
+from tools.patient_interrupts import interrupts_wait
 
 _ANGLE = COLUMNS.index("motor_angle_rad")
 _REFERENCE_SPEED = COLUMNS.index("reference_speed")
@@ -64,7 +65,8 @@ def from_rest(config: TableConfig, motions: NDArray[np.int64]) -> NDArray[np.boo
 
 def _samples(config: TableConfig, motions: NDArray[np.int64], ticks: int) -> Array:
     constants, state = switched_on(config, _SEED)
-    return run(constants, state, ticks, motions)[1]
+    with interrupts_wait():
+        return run(constants, state, ticks, motions)[1]
 
 
 def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) -> Array:
@@ -81,7 +83,8 @@ def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) ->
     applied = (padded[1:] * (1.0 - share) + padded[:-1] * share) * config.driver.supply_V
     constants, state = switched_on(config, _SEED)
     angle = np.empty(len(duty))
-    _run_open(constants.drive, state.drive, applied, angle)
+    with interrupts_wait():
+        _run_open(constants.drive, state.drive, applied, angle)
     return np.degrees(angle) / config.gears.ratio
 
 
