@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.arrays import BoolArray, FloatArray
-from planner.cost_to_go import ANY_COST, cost_to_go
+from planner.backward_step import ANY_COST
+from planner.cost_to_go import cost_to_go
 from planner.problem import Problem
 from planner.state_grid import default_grid
 

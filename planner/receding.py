@@ -10,20 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.arrays import CostArray, FloatArray
+from planner.backward_step import BackwardStep, prepare_backward_step, step_back
 from planner.config_map import column_value
 from planner.cost import acceleration_cost, speed_cost, value_cost
-from planner.cost_to_go import (
-    CostArray,
-    Transitions,
-    Workspace,
-    arrival_costs,
-    cost_from_any_speed,
-    lay_out_columns,
-    lay_out_transitions,
-    make_workspace,
-    step_back,
-)
+from planner.cost_to_go import cost_from_any_speed, lay_out_columns
 from planner.crossing import RunArray, step_is_allowed
 from planner.errors import PlannerError
 from planner.kernel import kernel
@@ -52,17 +43,13 @@ class OnlineStep(NamedTuple):
     Attributes:
         grid: where the cost-to-go is sampled.
         unit: cost of one unit of it.
-        transitions: what its steps do.
-        arrival_cost: (n_speeds,) second term of Eq. (5).
-        workspace: room for a backward step.
+        backward: its backward step.
         layers: (2, n_speeds, n_angles) room for the cost-to-go of two columns.
     """
 
     grid: Grid
     unit: float
-    transitions: Transitions
-    arrival_cost: CostArray
-    workspace: Workspace
+    backward: BackwardStep
     layers: CostArray
 
 
@@ -98,10 +85,9 @@ def prepare_online_step(problem: Problem, speed_count: int = SPEED_COUNT) -> Onl
     jump_count = 5 if speed_count <= FAST_SPEED_COUNT else 15
     grid = default_grid(problem, refinement=1, speed_count=speed_count, jump_count=jump_count, least_reach=2)
     unit = problem.greatest_step_cost
-    transitions = lay_out_transitions(problem.terms, grid, unit)
-    layers = np.empty((2, 2 * grid.half_count + 1, grid.angle_count), dtype=np.float32)
-    workspace = make_workspace(grid.angle_count, transitions)
-    return OnlineStep(grid, unit, transitions, arrival_costs(problem.terms, grid, unit), workspace, layers)
+    backward = prepare_backward_step(problem.terms, grid, unit)
+    layers = np.empty((2, len(backward.step_count), grid.angle_count), dtype=np.float32)
+    return OnlineStep(grid, unit, backward, layers)
 
 
 @kernel
@@ -162,19 +148,11 @@ def online_step(
 @kernel
 def _look_ahead(online: OnlineStep, node_cost: CostArray, sweep: RunArray, column: int, last: int) -> None:
     """Leave the cost-to-go of column + 1, over the columns up to `last`, in the layer of that column."""
-    layers = online.layers
+    layers, pause_price = online.layers, float(last - column)
     layers[last % 2] = 0.0
     for k in range(last - 1, column, -1):
-        step_back(
-            layers[(k + 1) % 2],
-            node_cost[k + 1],
-            sweep[k],
-            online.transitions,
-            online.arrival_cost,
-            float(last - column),
-            online.workspace,
-            layers[k % 2],
-        )
+        later, earlier = layers[(k + 1) % 2], layers[k % 2]
+        step_back(online.backward, later, node_cost[k + 1], sweep[k], pause_price, earlier)
 
 
 @kernel

@@ -3,9 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planner.backward_step import ANY_COST
 from planner.config_map import ConfigurationMap
 from planner.cost import Weights
-from planner.cost_to_go import ANY_COST, cost_from, cost_to_go
+from planner.cost_to_go import cost_from, cost_to_go
 from planner.dijkstra import Cells, lattice_path
 from planner.motion import Limits
 from planner.problem import Problem
