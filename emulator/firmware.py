@@ -21,8 +21,11 @@ IDLE = 0
 MOVING = 1
 SETTLING = 2
 STALLED = 3
+DRIVE_OFF = (IDLE, STALLED)
 
 STATE_NAMES = ("idle", "moving", "settling", "stalled")
+
+_DEMAND_SHIFT = SPEED_BITS - ERROR_BITS
 
 
 class Firmware(NamedTuple):
@@ -102,7 +105,7 @@ def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareStat
     measured = wrap_int32(count - counts[0])
     last_count = counts[-1]
     counts = (*counts[1:], count)
-    if motion in (IDLE, STALLED):
+    if motion in DRIVE_OFF:
         return _drive_off(motion, profile, reference, counts, switched_off(regulator, measured))
 
     if motion == MOVING:
@@ -121,7 +124,7 @@ def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareStat
         gain_set = HOLD
         settling_ticks += 1
 
-    window_demand = (demand * parameters.window_ticks) >> (SPEED_BITS - ERROR_BITS)
+    window_demand = (demand * parameters.window_ticks) >> _DEMAND_SHIFT
     regulator = pid_step(parameters.pid, regulator, gain_set, window_demand, measured)
     still = count == last_count and abs(regulator.duty) >= parameters.stall_duty
     still_ticks = still_ticks + 1 if still else 0

@@ -86,15 +86,17 @@ def _towards(profile: Profile, speed: int, distance: int) -> tuple[int, int]:
     (v + v') / 2 + v'^2 / 2a <= distance, that is v'^2 + a (v + v') <= 2 a distance.
     """
     top_speed, acceleration, far = profile
-    fastest = speed + acceleration
-    if fastest > top_speed:
-        fastest = max(top_speed, speed - acceleration)
+    slowest, fastest = speed - acceleration, speed + acceleration
+    if slowest > top_speed:
+        fastest = slowest
+    elif fastest > top_speed:
+        fastest = top_speed
     if 0 <= speed <= acceleration and (2 * distance < speed or distance <= (acceleration >> 2) + 2):
         return 0, distance  # the rest of the way is shorter than a tick
     if fastest > 0 and distance < far:
         room = 2 * acceleration * distance - acceleration * speed
         if fastest * (fastest + acceleration) > room:
-            fastest = max(_greatest_root(acceleration, room, fastest), speed - acceleration)
+            fastest = max(_greatest_root(acceleration, room, fastest), slowest)
     return fastest, (speed + fastest) >> 1
 
 

@@ -11,7 +11,7 @@ from emulator.config import TableConfig
 from emulator.drive_train import DriveState, DriveTrain, drive_train
 from emulator.drive_train import step as drive_step
 from emulator.encoder import Encoder, count_at, encoder
-from emulator.firmware import IDLE, STALLED, Firmware, FirmwareState, firmware, power_on
+from emulator.firmware import DRIVE_OFF, Firmware, FirmwareState, firmware, power_on
 from emulator.firmware import step as firmware_step
 from emulator.profiler import Profile
 
@@ -51,10 +51,8 @@ def woken(constants: TableConstants, drive: DriveState, profile: Profile) -> Tab
 
 def step(constants: TableConstants, state: TableState, load_torque_Nm: float) -> TableState:
     """Return the table one tick later."""
-    drive = drive_step(constants.drive, state.drive, state.duty * constants.volts_per_duty, load_torque_Nm)
-    count = count_at(constants.encoder, drive.angle_rad)
-    controller = firmware_step(constants.firmware, state.firmware, count)
-    return TableState(drive, controller, state.firmware.pid.duty)
+    drive, controller, duty = _step(constants, state.drive, state.firmware, state.duty, load_torque_Nm)
+    return TableState(drive, controller, duty)
 
 
 def run_undisturbed(
@@ -64,9 +62,20 @@ def run_undisturbed(
 
     A resting state is one whose step returns itself: it stays for ever, and the ticks that are left cost nothing.
     """
+    drive, controller, duty = state
     for _ in range(ticks):
-        before = state
-        state = step(constants, before, load_torque_Nm)
-        if state.firmware.motion in (IDLE, STALLED) and state == before:
-            return state, True
-    return state, False
+        before = (drive, controller, duty)
+        drive, controller, duty = _step(constants, drive, controller, duty, load_torque_Nm)
+        if controller.motion in DRIVE_OFF and (drive, controller, duty) == before:
+            return TableState(drive, controller, duty), True
+    return TableState(drive, controller, duty), False
+
+
+def _step(
+    constants: TableConstants, drive: DriveState, controller: FirmwareState, duty: int, load_torque_Nm: float
+) -> tuple[DriveState, FirmwareState, int]:
+    """Return the fields of the state one tick later; a `TableState` is made only of those that somebody sees."""
+    train, shaft_encoder, controller_constants, volts_per_duty = constants
+    drive = drive_step(train, drive, duty * volts_per_duty, load_torque_Nm)
+    count = count_at(shaft_encoder, drive.angle_rad)
+    return drive, firmware_step(controller_constants, controller, count), controller.pid.duty
