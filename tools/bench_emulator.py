@@ -37,14 +37,14 @@ def bench_emulator(stream: TextIO) -> None:
 
 
 def _bench_simulation(stream: TextIO) -> None:
+    """Print the speeds of what is in motion already; what a start costs is in `_bench_growth`."""
     config = load_config()
-    interpreted_s, compiled_s, control_s = 2.0, 1000.0, 100.0
-    speeds = {
-        "emulator, compiled (full physics)": compiled_s / median_s(lambda: _run_compiled(config, compiled_s)),
-        "emulator, interpreted (full physics)": interpreted_s
-        / median_s(lambda: _run_interpreted(config, interpreted_s)),
-        "python-control, linear loop": control_s / median_s(_linear_loop(config, control_s)),
+    runs = {
+        "emulator, compiled (full physics)": (1000.0, _compiled_motion),
+        "emulator, interpreted (full physics)": (10.0, _interpreted_motion),
+        "python-control, linear loop": (100.0, _linear_loop),
     }
+    speeds = {name: simulated_s / median_s(run(config, simulated_s)) for name, (simulated_s, run) in runs.items()}
     peer = speeds["python-control, linear loop"]
     rows = [(name, f"{speed:,.0f} x", f"{speed / peer:,.1f}") for name, speed in speeds.items()]
     header = ("one long motion, ticks of 1 ms, one core", "real time", "over the peer")
@@ -55,20 +55,21 @@ def _bench_growth(stream: TextIO) -> None:
     config = load_config()
     rows = []
     for simulated_s in (10.0, 100.0, 1000.0, 10_000.0):
-        wall_s = median_s(lambda duration=simulated_s: _run_compiled(config, duration), runs=3)  # type: ignore[misc]  # a default argument
+        wall_s = median_s(lambda duration=simulated_s: _compiled_motion(config, duration)(), runs=3)  # type: ignore[misc]  # a default argument
         rows.append((f"compiled, {simulated_s:,.0f} s in motion", f"{wall_s / simulated_s * 1e6:.2f}", _peak_memory()))
-    for simulated_s in (10.0, 100.0):
-        wall_s = median_s(lambda duration=simulated_s: _run_interpreted(config, duration), runs=1)  # type: ignore[misc]  # a default argument
-        rows.append(
-            (f"interpreted, {simulated_s:,.0f} s in motion", f"{wall_s / simulated_s * 1e6:.0f}", _peak_memory())
-        )
-    table, start = Table(config), time.perf_counter()
-    for _ in range(24):
-        table.receive(b"R 90\r")
-        table.advance(3600 * config.control.tick_hz)
-    wall_s = time.perf_counter() - start
-    rows.append(("a day with 24 motions, interpreted", f"{wall_s / 86_400 * 1e6:.2f}", _peak_memory()))
-    print_table(stream, "Growth", ("simulated time", "us of work per s", "peak memory"), rows)
+    for name, angle_deg, motions, simulated_s in (
+        ("interpreted, 10 s in motion", 100_000.0, 1, 10.0),
+        ("interpreted, 100 s in motion", 100_000.0, 1, 100.0),
+        ("interpreted, 1,000 s in motion", 100_000.0, 1, 1000.0),
+        ("interpreted, a day with 24 motions", 90.0, 24, 86_400.0),
+        ("interpreted, a week with 168 motions", 90.0, 168, 7 * 86_400.0),
+    ):
+        command = [sys.executable, "-m", "tools.interpreted_run", str(angle_deg), str(motions), str(simulated_s)]
+        answer = subprocess.run(command, check=True, capture_output=True, text=True)
+        wall_s, peak_mb = (float(number) for number in answer.stdout.split())
+        rows.append((name, f"{wall_s / simulated_s * 1e6:.2f}", f"{peak_mb:.0f} MB"))
+    header = ("simulated time (interpreted: alone in its process)", "us of work per s", "peak memory")
+    print_table(stream, "Growth", header, rows)
 
 
 def _bench_round_trip(stream: TextIO) -> None:
@@ -121,16 +122,18 @@ def _long_motion(config: TableConfig) -> tuple[TableConstants, TableState, batch
     return snapshot.constants, snapshot.state, motions
 
 
-def _run_compiled(config: TableConfig, simulated_s: float) -> None:
+def _compiled_motion(config: TableConfig, simulated_s: float) -> Callable[[], object]:
     constants, state, motions = _long_motion(config)
     ticks = round(simulated_s * config.control.tick_hz)
-    batch.run(constants, state, ticks, motions, every=ticks)
+    return lambda: batch.run(constants, state, ticks, motions, every=ticks)
 
 
-def _run_interpreted(config: TableConfig, simulated_s: float) -> None:
+def _interpreted_motion(config: TableConfig, simulated_s: float) -> Callable[[], object]:
+    """Return a run that goes on where the one before it ended."""
     table = Table(config.with_serial(baud=0))
     table.receive(b"R 100000\r")
-    table.advance(round(simulated_s * config.control.tick_hz))
+    ticks = round(simulated_s * config.control.tick_hz)
+    return lambda: table.advance(ticks)
 
 
 def _linear_loop(config: TableConfig, simulated_s: float) -> Callable[[], object]:
