@@ -111,7 +111,7 @@ COMMANDS: Mapping[str, Command] = {
     "reset": Command("cut the table's power and switch it on again", (), lambda stand, _: stand.reset()),
     "preset": Command(
         "reset the table, and let its counter begin elsewhere than at 0",
-        (Parameter("count", -(2**31), 2**31 - 1, "where the counter begins"),),
+        (Parameter("count", -(2**31), 2**31 - 1, "where the counter begins", whole=True),),
         lambda stand, given: stand.preset(int(given["count"])),
     ),
     "clear-faults": Command("end all faults, and forget those to come", (), lambda stand, _: stand.clear_faults()),

@@ -25,7 +25,7 @@ class FaultKind(NamedTuple):
 
 _PROBABILITY = Parameter("probability", 0.0, 1.0, "of each byte")
 _DIRECTION = Parameter(
-    "direction", -1, 1, "1: towards the table, -1: towards the client, 0 (default): both", optional=True
+    "direction", -1, 1, "1: towards the table, -1: towards the client, 0 (default): both", optional=True, whole=True
 )
 
 KINDS: Mapping[str, FaultKind] = {
@@ -33,7 +33,9 @@ KINDS: Mapping[str, FaultKind] = {
     "flip": FaultKind("a bit of a byte turns over on the line", (_PROBABILITY, _DIRECTION)),
     "delay": FaultKind("all replies come later", (Parameter("seconds", 0.0, 3600.0, "by how long"),)),
     "half-reply": FaultKind(
-        "the next reply ends before its end", (Parameter("bytes", 0, 32, "that are sent of it"),), strikes_once=True
+        "the next reply ends before its end",
+        (Parameter("bytes", 0, 32, "that are sent of it", whole=True),),
+        strikes_once=True,
     ),
     "late-reply": FaultKind(
         "the next reply comes late, and those after it behind it",
@@ -43,7 +45,7 @@ KINDS: Mapping[str, FaultKind] = {
     "silence": FaultKind("the table carries out what it hears and says nothing"),
     "hang-up": FaultKind("the port goes away; it comes back when the fault ends"),
     "wrong-baud": FaultKind(
-        "the table listens and talks at another rate", (Parameter("baud", 50, 4_000_000, "of it"),)
+        "the table listens and talks at another rate", (Parameter("baud", 50, 4_000_000, "of it", whole=True),)
     ),
     "stall": FaultKind("something holds the table"),
     "extra-load": FaultKind(
@@ -54,7 +56,7 @@ KINDS: Mapping[str, FaultKind] = {
     "stuck-pwm": FaultKind("the bridge keeps one duty", (Parameter("duty", -1.0, 1.0, "that it keeps"),)),
     "one-sided": FaultKind(
         "the bridge drives in one direction only",
-        (Parameter("direction", -1, 1, "1: forwards, -1: backwards, 0: neither"),),
+        (Parameter("direction", -1, 1, "1: forwards, -1: backwards, 0: neither", whole=True),),
     ),
     "lost-counts": FaultKind("encoder edges are not counted", (_PROBABILITY._replace(help="of each edge"),)),
     "swapped-encoder": FaultKind("the encoder's A and B are swapped: it counts the wrong way"),
@@ -63,7 +65,7 @@ KINDS: Mapping[str, FaultKind] = {
     "bounced-trigger": FaultKind(
         "each trigger edge is followed by others",
         (
-            Parameter("edges", 1, 100, "that follow"),
+            Parameter("edges", 1, 100, "that follow", whole=True),
             Parameter("within_s", 0.001, 10.0, "after it, spread by chance"),
         ),
     ),
@@ -73,7 +75,12 @@ KINDS: Mapping[str, FaultKind] = {
 SCHEDULE: tuple[Parameter, ...] = (
     Parameter("at_s", 0.0, 1e9, "begins at this time since the table was switched on (default: now)", optional=True),
     Parameter(
-        "at_command", 1, 1e9, "begins with this command, counted from the first ever (default: now)", optional=True
+        "at_command",
+        1,
+        1e9,
+        "begins with this command, counted from the first ever (default: now)",
+        optional=True,
+        whole=True,
     ),
     Parameter("for_s", 0.001, 1e9, "lasts so long (default: until it is cleared)", optional=True),
 )

@@ -118,6 +118,7 @@ def test_state_shows_all_that_the_table_shows(stand: QuietStand) -> None:
         (b'{"command": "load-torque", "torque_Nm": NaN}', "must be a number"),
         (b'{"command": "load-torque", "torque_Nm": 1e400}', "must be a number"),
         (b'{"command": "time-scale", "time_scale": 0}', "from 0.001"),
+        (b'{"command": "preset", "count": 0.5}', "count must be a whole number from -2147483648 to 2147483647"),
     ],
 )
 def test_a_bad_request_is_answered_with_a_sentence_and_changes_nothing(

@@ -59,6 +59,13 @@ def test_the_three_ways_take_the_same_names_and_numbers(kind: str, tmp_path: Pat
         ("drop", {}, "drop: probability is missing; it must be a number from 0 to 1"),
         ("drop", {"probability": 2}, "drop: probability is 2; it must be a number from 0 to 1"),
         ("drop", {"probability": math.nan}, "drop: probability is nan"),
+        (
+            "drop",
+            {"probability": 1, "direction": 0.5},
+            "drop: direction is 0.5; it must be a whole number from -1 to 1",
+        ),
+        ("bounced-trigger", {"edges": 2.5, "within_s": 1}, "bounced-trigger: edges is 2.5; it must be a whole number"),
+        ("stall", {"at_command": 1.5}, "stall: at_command is 1.5; it must be a whole number"),
         ("stall", {"force": 2}, "stall: force is not known; it takes at_s, at_command, for_s"),
         ("half-reply", {"bytes": 2, "for_s": 1}, "half-reply: for_s is not known"),
         ("stall", {"at_s": 1, "at_command": 1}, "stall: at_s and at_command are two beginnings"),
