@@ -20,6 +20,9 @@ from emulator.status import TableStatus
 LONGEST_REQUEST = 4096
 """Bytes in a request, its line feed included."""
 
+MOST_CLIENTS = 64
+"""Clients at once; the descriptors of a crowd would be more than `select` and the system bear."""
+
 _BACKLOG = 16
 _OWNER_ONLY = 0o177
 """The mask of permissions that a new socket must not have."""
@@ -164,7 +167,7 @@ def _number(command: str, parameter: Parameter, value: Any) -> float:  # noqa: A
 
 
 class ControlSocket:
-    """The listening end; any number of clients may be there at once.
+    """The listening end; up to `MOST_CLIENTS` may be there at once.
 
     Args:
         path: where the socket is put. One that a stand-in which has died left behind is replaced.
@@ -200,9 +203,7 @@ class ControlSocket:
         """Take in new clients and answer every request that has come in whole."""
         with suppress(BlockingIOError):
             while True:
-                client, _ = self._listener.accept()
-                client.setblocking(False)
-                self._clients[client] = b""
+                self._welcome(self._listener.accept()[0])
         for client in list(self._clients):
             if not self._serve_client(client, stand):
                 del self._clients[client]
@@ -216,6 +217,14 @@ class ControlSocket:
         with suppress(OSError):
             if self.path.stat().st_ino == self._inode:
                 self.path.unlink()
+
+    def _welcome(self, client: socket.socket) -> None:
+        client.setblocking(False)
+        if len(self._clients) < MOST_CLIENTS:
+            self._clients[client] = b""
+            return
+        with client, suppress(OSError):
+            client.sendall(_refusal(f"too many clients: {MOST_CLIENTS} are connected already"))
 
     def _serve_client(self, client: socket.socket, stand: Stand) -> bool:
         """Return whether the client stays: not when it hung up, or lets its answers pile up."""

@@ -25,13 +25,13 @@ def request(path: Path, command: str, **parameters: float) -> dict[str, Any]:
     """Return the answer to one command.
 
     Raises:
-        ControlError: nobody listens at `path`, or the request is refused.
+        ControlError: nobody listens at `path`, something else answers there, or the request is refused.
     """
     line = json.dumps({"command": command, **parameters}).encode() + b"\n"
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-            connection.connect(str(path))
             connection.settimeout(_TIMEOUT_S)
+            connection.connect(str(path))
             connection.sendall(line)
             with connection.makefile("rb") as replies:
                 reply = replies.readline()
@@ -39,10 +39,21 @@ def request(path: Path, command: str, **parameters: float) -> dict[str, Any]:
         raise ControlError(f"{path}: {error}; start a stand-in with --control {path}") from error
     if not reply:
         raise ControlError(f"{path}: the stand-in hung up without an answer")
-    result: dict[str, Any] = json.loads(reply)
+    result = _result(reply)
+    if result is None:
+        raise ControlError(f"{path}: {reply[:80]!r} is no answer of a stand-in; is this its control channel?")
     if not result.pop("ok"):
         raise ControlError(result["error"])
     return result
+
+
+def _result(reply: bytes) -> dict[str, Any] | None:
+    """Return an answer's fields, or None where it is none."""
+    try:
+        fields = json.loads(reply)
+    except ValueError:
+        return None
+    return fields if isinstance(fields, dict) and ("error" in fields or fields.get("ok") is True) else None
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -6,12 +6,13 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from emulator.config import load_config
-from emulator.control import COMMANDS, LONGEST_REQUEST, ControlSocket, answer
+from emulator.control import COMMANDS, LONGEST_REQUEST, MOST_CLIENTS, ControlSocket, answer
 from emulator.control_client import ControlError, main, request
 from emulator.faults import Fault
 from emulator.status import TableStatus
@@ -188,6 +189,56 @@ def test_clients_that_go_without_a_word_harm_nobody(served: Path) -> None:
             client.connect(str(served))
             client.sendall(b'{"command": "state"}\n{"comm')
     assert request(served, "trigger") == {}
+
+
+def test_a_crowd_of_clients_is_turned_away_and_those_who_were_there_are_served(folder: Path, stand: QuietStand) -> None:
+    control = ControlSocket(folder / "control")
+    with ExitStack() as stack:
+        stack.callback(control.close)
+        clients = [stack.enter_context(socket.socket(socket.AF_UNIX)) for _ in range(MOST_CLIENTS + 1)]
+        for client in clients:
+            client.settimeout(5.0)
+            client.connect(str(control.path))
+            control.serve(stand)
+        assert b"too many" in clients[-1].recv(4096)
+        assert clients[-1].recv(4096) == b""
+        clients[0].sendall(b'{"command": "trigger"}\n')
+        control.serve(stand)
+        assert json.loads(clients[0].recv(4096)) == {"ok": True}
+        clients[0].close()
+        control.serve(stand)
+        latecomer = stack.enter_context(socket.socket(socket.AF_UNIX))
+        latecomer.connect(str(control.path))
+        latecomer.sendall(b'{"command": "reset"}\n')
+        control.serve(stand)
+    assert stand.done == ["trigger", "reset"]
+
+
+def test_a_stand_in_that_takes_nobody_in_is_not_waited_for(folder: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as deaf, socket.socket(socket.AF_UNIX) as waiting:
+        deaf.bind(str(folder / "control"))
+        deaf.listen(0)
+        waiting.connect(str(folder / "control"))
+        with pytest.raises(ControlError):
+            request(folder / "control", "trigger")
+
+
+@pytest.mark.parametrize("reply", [b"HTTP/1.1 400 Bad Request\n", b'{"ok": tr', b"[]\n", b"{}\n"])
+def test_an_answer_of_something_else_is_said_to_be_none(folder: Path, reply: bytes) -> None:
+    def answer_once() -> None:
+        client, _ = listener.accept()
+        with client:
+            client.recv(4096)
+            client.sendall(reply)
+
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(folder / "control"))
+        listener.listen()
+        thread = threading.Thread(target=answer_once)
+        thread.start()
+        with pytest.raises(ControlError, match="no answer of a stand-in"):
+            request(folder / "control", "trigger")
+        thread.join()
 
 
 def test_the_command_line_shows_the_state(served: Path, capsys: pytest.CaptureFixture[str]) -> None:
