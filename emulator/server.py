@@ -73,6 +73,7 @@ class Server:
         while self._running:
             readable, writable = self._wait()
             self._catch_up()
+            self._let_go()
             if self._table.hung_up is not self._hung_up:
                 self._follow_hang_up()
             for port in self._ports:
@@ -93,7 +94,10 @@ class Server:
     def trigger(self) -> None:
         """Latch the encoder at this instant."""
         fraction = self._clock.now_ticks() - self._table.tick
-        self._table.trigger(min(max(fraction, 0.0), _LAST_FRACTION))
+        if fraction <= 0.0:  # another edge in the tick that the one before it has brought to its end
+            self._table.trigger()
+            return
+        self._table.trigger(min(fraction, _LAST_FRACTION))
         # The tick that the edge is in must be over before a client can ask for the latch.
         self._table.advance(1)
         self._send_replies()
@@ -164,7 +168,6 @@ class Server:
                 return
             self._table.advance(min(behind, _CATCH_UP_TICKS))
             self._send_replies()
-            self._let_go()
 
     def _give_up_when_far(self, behind: int) -> None:
         if behind < _GIVE_UP_S * self._clock.ticks_per_wall_s:
@@ -195,7 +198,6 @@ class Server:
             self._send_replies()
         if arrival.left_after:
             self._leaving = True
-            self._let_go()
 
     def _warn_of_two(self) -> None:
         busy = [port.name for port in self._ports if port.client_count]
