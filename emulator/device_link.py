@@ -28,7 +28,13 @@ class DeviceLink:
             _replace(path, device)
 
     def lead_to(self, device: str) -> None:
-        """Lead to another device from now on."""
+        """Lead to another device from now on.
+
+        Raises:
+            FileExistsError: something else than a link to a pty has taken the link's place.
+            OSError: the path cannot be written.
+        """
+        _target(self.path)
         _replace(self.path, device)
         self._device = device
 

@@ -118,9 +118,12 @@ class PtyPort:
     def come_back(self) -> None:
         """Be there again after `hang_up`: a new device, to which the link leads."""
         self._open()
-        if self.link is not None:
-            self.link.lead_to(self.name)
         self._warn(f"the port has come back as {self.name}")
+        if self.link is not None:
+            try:
+                self.link.lead_to(self.name)
+            except OSError as error:
+                self._warn(f"{self.link.path} does not lead to it: {error.strerror}")
 
     def close(self) -> None:
         """Close both ends; a client that is still there reads end of file."""

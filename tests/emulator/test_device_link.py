@@ -56,6 +56,16 @@ def test_a_link_that_another_stand_in_has_taken_over_is_left_to_it(tmp_path: Pat
     assert path.readlink() == Path(OTHER_DEVICE)
 
 
+def test_a_link_whose_place_another_file_has_taken_leads_nowhere_new(tmp_path: Path) -> None:
+    path = tmp_path / "table"
+    link = DeviceLink(path, DEVICE)
+    path.unlink()
+    path.write_text("three years of work")
+    with pytest.raises(FileExistsError, match="something else"):
+        link.lead_to(OTHER_DEVICE)
+    assert path.read_text() == "three years of work"
+
+
 def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         DeviceLink(tmp_path / "none" / "table", DEVICE)

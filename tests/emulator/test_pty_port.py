@@ -4,10 +4,12 @@ import select
 import sys
 import termios
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 import serial
 
+from emulator.device_link import DeviceLink
 from emulator.outbox import LIMIT_BYTES
 from emulator.port import Arrival
 from emulator.pty_port import READ_BYTES, PtyPort
@@ -256,3 +258,20 @@ def test_ports_are_many_and_apart(warnings: list[str]) -> None:
     assert len({port.name for port in ports}) == 8
     for port in ports:
         port.close()
+
+
+def test_a_port_comes_back_without_its_link_when_the_links_place_is_taken(
+    port: PtyPort, warnings: list[str], tmp_path: Path, opened: Open
+) -> None:
+    path = tmp_path / "table"
+    port.link = DeviceLink(path, port.name)
+    port.hang_up()
+    path.unlink()
+    path.write_text("three years of work")
+    port.come_back()
+    assert not path.is_symlink()
+    assert path.read_text() == "three years of work"
+    assert any(str(path) in sentence for sentence in warnings)
+    client = opened(port.name)
+    os.write(client, b"H\r")
+    assert port.receive().data == b"H\r"
