@@ -6,6 +6,7 @@ the bytes are there or the time-out is over, `flush` until all is sent, `clock.s
 """
 
 import math
+from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 from urllib.parse import parse_qsl, urlsplit
 
@@ -76,7 +77,7 @@ class Serial(SerialBase):
     def close(self) -> None:
         """Let what was written reach the table, and go; the motion that is running goes on."""
         if self.is_open:
-            if not self.table.hung_up:
+            with suppress(SerialException):  # The device may go away with the bytes still on the line.
                 self.flush()
             self.table.disconnect()
             self.is_open = False

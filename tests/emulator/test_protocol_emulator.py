@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import emulator
+from emulator.faults import fault_from
 from emulator.protocol_emulator import OUTPUT_BYTES, Serial
 from protocol import TableClient, WallClock
 from protocol.clock import clock_of
@@ -160,6 +161,13 @@ def test_closing_leaves_the_motion_running_and_a_half_line_behind(port: Serial) 
     assert ask(port, b"H").startswith(b"H ")
     port.clock.sleep_s(5.0)
     assert ask(port, b"H") == b"H 5.0\r"
+
+
+def test_a_port_that_goes_away_while_it_is_closed_is_closed(port: Serial) -> None:
+    port.write(b"H\r" * 300)
+    port.table.inject(fault_from("hang-up", {"at_s": port.clock.now_s() + 0.05}))
+    port.close()
+    assert not port.is_open
 
 
 def test_options_of_the_url_reach_the_table(tmp_path: Path) -> None:
