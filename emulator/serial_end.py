@@ -97,7 +97,8 @@ class SerialEnd:
     def _read(self, data: bytes, tick: int, answer: Answer) -> None:
         self._heard += data
         for line in self._lines.feed(data):
-            self.write(answer(line), tick)
+            if reply := answer(line):
+                self.write(reply, tick)
 
     def _put(self, reply: bytes) -> None:
         if self._paced:

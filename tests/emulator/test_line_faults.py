@@ -64,6 +64,13 @@ def test_half_a_reply_is_a_missing_one_and_the_client_recovers(bench: Bench) -> 
     assert bench.client.position_deg() == 0.0
 
 
+def test_a_line_that_gets_no_reply_does_not_use_up_a_fault_of_the_next_one() -> None:
+    bench = Bench("emulator://?strict=1")
+    bench.inject("half-reply", bytes=3)
+    assert bench.raw(b"nonsense") == b""
+    assert bench.raw(b"H") == b"H 0"
+
+
 def test_a_late_reply_is_never_the_answer_to_a_later_command(bench: Bench) -> None:
     bench.inject("late-reply", seconds=1.5)
     with pytest.raises(ReplyTimeout):
