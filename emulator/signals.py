@@ -10,11 +10,12 @@ class SignalWatch:
     """Collects signals while it is entered; what they did before is put back afterwards.
 
     Args:
-        names: such as `SIGTERM`; those that the system does not have are left out.
+        names: such as `SIGTERM`. Those that the system does not have are left out, and so is `SIGHUP` where it is
+            ignored: whoever starts a program with nohup wants it to outlive the terminal.
     """
 
     def __init__(self, *names: str) -> None:
-        self._numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+        self._numbers = [getattr(signal, name) for name in names if hasattr(signal, name) and not _is_nohup(name)]
         self._reader, self._writer = socket.socketpair()
         self._reader.setblocking(False)
         self._writer.setblocking(False)
@@ -44,6 +45,10 @@ class SignalWatch:
             signal.signal(number, handler)
         self._reader.close()
         self._writer.close()
+
+
+def _is_nohup(name: str) -> bool:
+    return name == "SIGHUP" and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
 
 
 def _collected(number: int, frame: FrameType | None) -> None:

@@ -260,6 +260,8 @@ def test_a_client_that_is_killed_in_mid_line_leaves_a_working_table(stand_in: St
 def test_a_signal_ends_it_well_and_leaves_nothing_behind(
     stand_in: Start, tmp_path: Path, number: signal.Signals
 ) -> None:
+    if signal.getsignal(number) is signal.SIG_IGN:
+        pytest.skip(f"{number.name} is ignored here, as under nohup")
     link, control, trace = tmp_path / "table", tmp_path / "control", tmp_path / "run.csv"
     table = stand_in("--pty", "--link", str(link), "--control", str(control), "--trace", str(trace))
     with open_port(str(link)) as port:
@@ -271,6 +273,18 @@ def test_a_signal_ends_it_well_and_leaves_nothing_behind(
     recorded = read_trace(trace)
     assert b"".join(recorded.received) == b"P 1\r"
     assert b"".join(recorded.transmitted) == b"OK\r"
+
+
+@pytest.mark.skipif(shutil.which("nohup") is None, reason="nohup is not installed")
+def test_a_table_that_nohup_started_outlives_its_terminal() -> None:
+    command = ["nohup", sys.executable, "-m", "emulator", "--tcp", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as table:
+        assert table.stdout is not None
+        with open_port(table.stdout.readline().strip()) as port:
+            table.send_signal(signal.SIGHUP)
+            assert ask(port, b"H") == b"H 0.0\r"
+            table.terminate()
+        assert table.wait(10) == 0
 
 
 def test_sigusr1_is_the_probes_trigger(stand_in: Start, wait_until: WaitUntil) -> None:
