@@ -1,0 +1,37 @@
+"""What tests of the running stand-in share: its start, and a client that waits for answers."""
+
+import subprocess
+from collections.abc import Callable
+from typing import Protocol
+
+import serial
+
+WaitUntil = Callable[[Callable[[], bool]], None]
+
+
+class StandIn(Protocol):
+    """What the fixture `stand_in` starts."""
+
+    process: subprocess.Popen[str]
+    port: str
+
+    @property
+    def stderr(self) -> str: ...
+    def next_line(self) -> str: ...
+    def wait_for_words(self, words: str) -> None: ...
+
+
+Start = Callable[..., StandIn]
+
+
+def open_port(url: str, baud: int = 9600) -> serial.Serial:
+    return serial.serial_for_url(url, baudrate=baud, timeout=10.0, write_timeout=10.0)
+
+
+def ask(port: serial.Serial, command: bytes) -> bytes:
+    port.write(command + b"\r")
+    return bytes(port.read_until(b"\r"))
+
+
+def wait_for_position(port: serial.Serial, reply: bytes, wait_until: WaitUntil) -> None:
+    wait_until(lambda: ask(port, b"H") == reply)

@@ -1,0 +1,38 @@
+"""A table without a line to wait for, and what tests do with it."""
+
+from collections.abc import Iterator
+
+from emulator.config import load_config
+from emulator.status import TableStatus
+from emulator.table import Table
+
+PACED = load_config()
+UNPACED = PACED.with_serial(baud=0, decimals=6)
+REST_DEG = 0.05
+
+
+def ask(table: Table, *lines: str) -> bytes:
+    """Send lines on an unpaced line and return what is answered at once."""
+    table.receive("".join(f"{line}\r" for line in lines).encode())
+    return table.transmit()
+
+
+def move(table: Table, *lines: str) -> TableStatus:
+    """Send lines and wait until the table stands; they must all be accepted."""
+    assert set(ask(table, *lines).split()) == {b"OK"}
+    return until_at_rest(table)
+
+
+def until_at_rest(table: Table) -> TableStatus:
+    for _ in range(1000):
+        table.advance(100)
+        if table.status().state in {"idle", "stalled"}:
+            table.advance(100)  # let it run out
+            return table.status()
+    raise AssertionError(f"still on its way: {table.status()}")
+
+
+def statuses(table: Table, ticks: int) -> Iterator[TableStatus]:
+    for _ in range(ticks):
+        table.advance(1)
+        yield table.status()

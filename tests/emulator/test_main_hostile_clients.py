@@ -1,0 +1,127 @@
+"""What clients that misbehave, or die, do not do to the stand-in."""
+
+import os
+import random
+import select
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import serial
+
+from emulator import control_client
+from tests.emulator.served import Start, WaitUntil, ask, open_port, wait_for_position
+
+pytestmark = [
+    pytest.mark.realtime,
+    pytest.mark.skipif(sys.platform != "linux", reason="what is known about ptys was measured on Linux"),
+]
+
+
+def test_a_half_line_is_not_glued_to_the_next_clients_first(stand_in: Start) -> None:
+    table = stand_in("--pty")
+    half = os.open(table.port, os.O_RDWR | os.O_NOCTTY)
+    os.write(half, b"P 9")
+    os.close(half)
+    time.sleep(0.1)
+    after = os.open(table.port, os.O_RDWR | os.O_NOCTTY)
+    os.write(after, b"0\r")
+    reply = b""
+    while not reply.endswith(b"\r"):  # what is on the wire when a client leaves may reach the next one
+        assert select.select([after], [], [], 10.0)[0]
+        reply += os.read(after, 64)
+    os.close(after)
+    assert reply == b"ERR 1 unknown command\r"
+    with open_port(table.port) as port:
+        assert ask(port, b"H") == b"H 0.0\r"
+        time.sleep(0.2)
+        assert ask(port, b"H") == b"H 0.0\r"
+
+
+def test_a_client_may_come_and_go_many_times(stand_in: Start) -> None:
+    table = stand_in("--pty", "--baud", "0")
+    for _ in range(50):
+        with open_port(table.port) as port:
+            assert ask(port, b"H") == b"H 0.0\r"
+    assert "two programs" not in table.stderr
+
+
+def test_random_bytes_by_the_megabyte_move_nothing(stand_in: Start, tmp_path: Path, wait_until: WaitUntil) -> None:
+    """Any bytes at any split: one reply a line, in order, and the motion that was running goes on untouched."""
+    control = tmp_path / "control"
+    table = stand_in("--pty", "--baud", "0", "--time-scale", "0.01", "--control", str(control))
+    chance = random.Random(1)  # noqa: S311  # noise is no secret
+    # Without the letters that could, by chance, be a command that is to be carried out.
+    harmless = sorted(set(range(256)) - set(b"PRSA"))
+    noise = bytes(chance.choices(harmless, k=1 << 20))
+    lines = [line for line in noise.replace(b"\n", b"").split(b"\r") if line]
+    received = bytearray()
+    with open_port(table.port) as port:
+        assert ask(port, b"P 40") == b"OK\r"
+        port.timeout = 0
+        position = 0
+        while position < len(noise):
+            size = chance.randint(1, 2000)
+            port.write(noise[position : position + size])
+            position += size
+            received += port.read(65536)
+        port.timeout = 10.0
+        port.write(b"\r")
+        while received.count(b"\r") < len(lines):
+            received += port.read_until(b"\r")
+        replies = bytes(received).split(b"\r")
+        assert len(replies) == len(lines) + 1
+        assert {reply[:5] for reply in replies} <= {b"H 0.0", b"L 0.0", b"ERR 1", b"ERR 2", b"ERR 4", b"ERR 5", b""}
+        control_client.request(control, "time-scale", time_scale=50.0)
+        wait_for_position(port, b"H 40.0\r", wait_until)
+
+
+def test_an_unread_client_blocks_neither_commands_nor_others(stand_in: Start, wait_until: WaitUntil) -> None:
+    table = stand_in("--pty", "--baud", "0", "--tcp", "0", "--time-scale", "20")
+    url = table.next_line()
+    deaf = os.open(table.port, os.O_RDWR | os.O_NOCTTY)
+    os.write(deaf, b"P 10\r")
+    for _ in range(20):
+        os.write(deaf, b"Q\r" * 500)
+    table.wait_for_words("does not read its replies")
+    with open_port(url) as port:
+        port.timeout = 0.5
+        port.read(1 << 20)  # The replies to the other are heard here too, as long as there are any.
+        wait_until(lambda: ask(port, b"H") == b"H 10.0\r")
+    assert "at once" in table.stderr
+    os.close(deaf)
+
+
+def test_a_client_that_floods_a_slow_line_is_made_to_wait_and_the_next_one_is_not_confused(stand_in: Start) -> None:
+    table = stand_in("--pty", "--time-scale", "20")
+    with open_port(table.port) as port:
+        port.write_timeout = 0.2
+        with pytest.raises(serial.SerialTimeoutException):
+            port.write(b"L\r" * 100_000)
+    time.sleep(0.1)
+    with open_port(table.port) as port:
+        assert ask(port, b"H") == b"H 0.0\r"
+
+
+def test_a_wrong_rate_is_garbage_and_stderr_says_why(stand_in: Start) -> None:
+    table = stand_in("--pty")
+    with open_port(table.port, 4800) as port:
+        port.write(b"P 90\r")
+        table.wait_for_words("set to 4800 baud and the table to 9600")
+        time.sleep(0.2)
+    with open_port(table.port) as port:
+        assert ask(port, b"H") == b"H 0.0\r"
+
+
+def test_a_client_that_is_killed_in_mid_line_leaves_a_working_table(stand_in: Start) -> None:
+    table = stand_in("--pty")
+    script = f"exec 3<>{table.port}; printf 'P 1' >&3; echo; read never_comes <&3"
+    with subprocess.Popen(["sh", "-c", script], stdout=subprocess.PIPE) as client:
+        assert client.stdout is not None
+        client.stdout.readline()
+        client.kill()
+    with open_port(table.port) as port:
+        time.sleep(0.1)
+        assert ask(port, b"H") == b"H 0.0\r"
