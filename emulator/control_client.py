@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from emulator.control import COMMANDS
+from emulator.control_commands import COMMANDS
 
 _TIMEOUT_S = 5.0
 _EXAMPLE = """example:

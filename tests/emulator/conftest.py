@@ -1,13 +1,17 @@
 import os
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from emulator.control import ControlSocket
 from tests.emulator.fault_bench import Bench
+from tests.emulator.quiet_stand import QuietStand
 
 PATIENCE_S = 20.0
 """How long to wait for what should come at once: only a failing test ever does."""
@@ -97,3 +101,33 @@ def opened() -> Iterator[Callable[[str], int]]:
 def bench() -> Bench:
     """A table for faults to strike, with its port and its client."""
     return Bench()
+
+
+@pytest.fixture
+def stand() -> QuietStand:
+    return QuietStand()
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """A folder with a name that is short enough for a socket's."""
+    with tempfile.TemporaryDirectory(prefix="table-") as name:
+        yield Path(name)
+
+
+@pytest.fixture
+def served(folder: Path, stand: QuietStand) -> Iterator[Path]:
+    """The path of a control channel that is served until the test is over."""
+    control = ControlSocket(folder / "control")
+    ended = threading.Event()
+
+    def serve() -> None:
+        while not ended.wait(0.002):
+            control.serve(stand)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    yield control.path
+    ended.set()
+    thread.join()
+    control.close()

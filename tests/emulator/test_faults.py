@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from emulator.config import load_config
-from emulator.control import COMMANDS
+from emulator.control_commands import COMMANDS
 from emulator.faults import KINDS, FaultError, fault_from, parameters_of
 from emulator.toml_section import ConfigError
 
