@@ -58,7 +58,8 @@ class SerialEnd:
                 self._lines.spoil()
             else:
                 self._read(bytes((byte,)), tick, answer)
-        self._send(uart.transmit())
+        if sent := uart.transmit():
+            self._send(sent)
 
     def write(self, reply: bytes, tick: int) -> None:
         """Give a reply to the line."""

@@ -49,8 +49,11 @@ class TriggerInput:
 
     def take(self, tick: int) -> float | None:
         """Take the next edge if it comes before the end of the tick that begins at `tick`; return its fraction."""
-        edge = min(self._upcoming(), default=None)
-        if edge is None or edge[0] > tick:
+        upcoming = self._upcoming()
+        if not upcoming:
+            return None
+        edge = min(upcoming)
+        if edge[0] > tick:
             return None
         if self._single and edge == self._single[0]:
             heappop(self._single)
