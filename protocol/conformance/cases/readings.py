@@ -44,12 +44,19 @@ def the_position_is_unwrapped(rig: Rig) -> None:
     rig.finish()
 
 
-@case("4.2/4")
+@case("4.2/4", travel_deg=10)
 def reading_changes_nothing(rig: Rig) -> None:
-    """Read ten times."""
-    first = rig.read()
+    """Read both registers again and again, in a motion and at rest: neither the motion nor the latch heeds it."""
+    latched = rig.read(b"L")
+    rig.move_to(10)
     for _ in range(10):
-        require(rig.read() == first, "the position changed while it was only read")
+        rig.sample()
+        rig.read(b"L")
+    rig.finish()
+    resting = rig.read()
+    for letter, value in ((b"H", resting), (b"L", latched)) * 10:
+        got = rig.read(letter)
+        require(got == value, f"{letter!r} went from {value} to {got} deg while both were only read")
 
 
 @case("4.3/1")

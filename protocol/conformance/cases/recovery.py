@@ -2,9 +2,11 @@
 
 from protocol.client import TableClient
 from protocol.conformance.case import case
+from protocol.conformance.reference import Sample
 from protocol.conformance.rig import Rig
 from protocol.conformance.stand import ERROR_REPLIES
-from protocol.conformance.verdict import require
+from protocol.conformance.verdict import NonconformityError, require
+from protocol.errors import ReplyTimeout, UnexpectedReply
 from protocol.messages import ErrorCode
 
 
@@ -24,18 +26,24 @@ def cancel_ends_a_half_line(rig: Rig) -> None:
         rig.refused(b"\x18", ErrorCode.BAD_BYTE)
 
 
-@case("8.3/2")
+@case("8.3/2", travel_deg=20)
 def late_replies_are_told_apart(rig: Rig) -> None:
-    """Leave two replies unread, as one that came before may, and let the client find its place by the rules of 8.3."""
+    """In a motion leave two replies unread, as one that came before may; the client reads where the table is now."""
+    rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
+    rig.move_to(20)
+    rig.follow(0.5)
     rig.wire.send(b"H\rL\r")
-    _client_agrees(rig)
+    _client_reads(rig)
+    rig.finish()
 
 
 @case("8.3/3", ERROR_REPLIES)
 def a_client_finds_its_place_after_noise(rig: Rig) -> None:
     """Send noise without CAN or CR, and let the client find its place by the rules of 8.3."""
     rig.wire.send(bytes(rig.chance.randrange(0x80, 0x100) for _ in range(20)))
-    _client_agrees(rig)
+    position = _client_reads(rig)
+    own = rig.read()
+    require(position == float(own), f"the client read {position}, the suite {own}")
 
 
 @case("8.3/4", travel_deg=20)
@@ -51,10 +59,16 @@ def a_stop_is_heard_at_once(rig: Rig) -> None:
     rig.measure("where R 0 brought it to rest", stopped, "deg", most=15)
 
 
-def _client_agrees(rig: Rig) -> None:
-    """Require that a client, as anybody would use it, reads the same position as this suite."""
+def _client_reads(rig: Rig) -> float:
+    """Return what a client reads, as anybody would use it; in a motion it is held against the trapezoid."""
     client = TableClient(rig.wire.port, rig.profile.serial.timeout_s)
-    position = client.position_deg()
-    rig.wire.listen(0.1)
-    own = rig.read()
-    require(position == float(own), f"the client read {position}, the suite {own}")
+    try:
+        position = client.position_deg()
+    except (ReplyTimeout, UnexpectedReply) as error:
+        raise NonconformityError(f"the client does not find its place: {error}") from error
+    asked_s = next(event.time_s for event in reversed(rig.wire.port.events) if event.direction == "sent")
+    heard_s = rig.wire.clock.now_s()
+    if rig.motion.expectations:
+        rig.motion.samples.append(Sample((asked_s + heard_s) / 2, position, (heard_s - asked_s) / 2))
+    rig.silence("after the client had found its place the line")
+    return position

@@ -75,8 +75,9 @@ def a_trigger_latches_the_position(rig: Rig) -> None:
 
 @case("6.2/2", TRIGGER, travel_deg=20)
 def each_trigger_overwrites_the_latch(rig: Rig) -> None:
-    """Latch at three places."""
+    """Latch at three places, with two triggers before each is read."""
     for target in (10, 20, 0):
+        rig.stand.trigger()
         rig.move_to(target)
         rig.finish(f"at {target}")
         rig.stand.trigger()

@@ -122,7 +122,7 @@ def test_a_session_that_is_interrupted_on_its_way_home_stops_the_table() -> None
         rig.wait_for_rest()
 
     with pytest.raises(KeyboardInterrupt):
-        session.run([dataclasses.replace(chosen_cases(["4.2/4"])[0], run=elsewhere)])
+        session.run([dataclasses.replace(chosen_cases(["4.3/1"])[0], run=elsewhere)])
     status = port.table.status()
     assert status.state == "idle"
     assert 40 < status.encoder_deg < 60  # on its way, where it was stopped
