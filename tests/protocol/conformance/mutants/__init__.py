@@ -1,6 +1,31 @@
 """Deliberately wrong tables: each breaks one rule, and names the case that is there to catch it."""
 
-from tests.protocol.conformance.mutants import grammar, lines, motion, readings, replies, settings, trigger
+from tests.protocol.conformance.mutants import (
+    grammar,
+    lines,
+    motion,
+    preemption,
+    readings,
+    recovery,
+    replies,
+    settings,
+    targets,
+    trigger,
+)
 from tests.protocol.conformance.mutants.mutant import MUTANTS, Mutant, port_to
 
-__all__ = ["MUTANTS", "Mutant", "grammar", "lines", "motion", "port_to", "readings", "replies", "settings", "trigger"]
+__all__ = [
+    "MUTANTS",
+    "Mutant",
+    "grammar",
+    "lines",
+    "motion",
+    "port_to",
+    "preemption",
+    "readings",
+    "recovery",
+    "replies",
+    "settings",
+    "targets",
+    "trigger",
+]

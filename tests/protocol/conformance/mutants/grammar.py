@@ -3,8 +3,8 @@
 import re
 from decimal import Decimal
 
-from protocol.messages import Command, Verb
-from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by
+from protocol.messages import Command, ErrorCode, Verb
+from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by, verb_of
 
 
 @caught_by("4.1/1")
@@ -99,3 +99,12 @@ class LongNumbersWrap(Mutant):
         if isinstance(command, Command) and command.value is not None:
             command = Command(command.verb, command.value % 2**15 if abs(command.value) > 2**31 else command.value)
         return super()._reply(command)
+
+
+@caught_by("4.1/11")
+class BusyInMotion(Mutant):
+    """S and A are refused in a motion"""
+
+    def _reply(self, command: Line) -> bytes:
+        busy = self.moving and verb_of(command) in {Verb.SET_SPEED, Verb.SET_ACCELERATION}
+        return super()._reply(ErrorCode.OUT_OF_RANGE if busy else command)

@@ -104,6 +104,24 @@ class ThinksLong(Mutant):
         self.inject(fault_from("delay", {"seconds": 0.05}))
 
 
+@caught_by("2.2/3")
+class ComputesInMidReply(Mutant):
+    """it sends the letter, and then computes the angle for 30 ms"""
+
+    unsent, next_tick = b"", 0
+
+    def ticks_until_byte(self) -> int | None:
+        return 1 if self.unsent else super().ticks_until_byte()
+
+    def transmit(self) -> bytes:
+        self.unsent += super().transmit()
+        if self.tick < self.next_tick:
+            return b""
+        byte, self.unsent = self.unsent[:1], self.unsent[1:]
+        self.next_tick = self.tick + 30 * byte.count(b"H")
+        return byte
+
+
 class ForgivingBuffer(LineBuffer):
     def spoil(self) -> None:
         """Overlook what was lost."""
@@ -116,6 +134,15 @@ class OverlooksLostBytes(Mutant):
     def __init__(self, config: TableConfig, seed: int = 0) -> None:
         super().__init__(config, seed)
         self._serial._lines = ForgivingBuffer()  # noqa: SLF001 - a wrong table reaches into itself
+
+
+@caught_by("2.3/3")
+class LocksUpWhenOverrun(Mutant):
+    """an overrun shuts the receiver for good, as a flag that nobody clears"""
+
+    def receive(self, data: bytes) -> None:
+        if not self._serial.uart.lost_bytes:
+            super().receive(data)
 
 
 @caught_by("3.1/4")
@@ -152,11 +179,3 @@ class LongLinesDrag(Mutant):
         reply = super()._reply(ErrorCode.BAD_BYTE if self.spoiled else command)
         self.spoiled = command is ErrorCode.LINE_TOO_LONG
         return reply
-
-
-@caught_by("8.1/1")
-class AlmostEnoughBuffer(Mutant):
-    """the buffer holds 62 bytes"""
-
-    def receive(self, data: bytes) -> None:
-        super().receive(data[:62])

@@ -1,213 +1,150 @@
-"""Wrong tables: the target of a motion, its profile, and what replaces it."""
+"""Wrong tables: a motion from rest, and its end."""
 
 from decimal import Decimal
+from math import isqrt
 
+from emulator.fixed_point import POSITION_BITS
 from protocol.messages import Command, Verb
-from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by, verb_of
-from tests.protocol.conformance.mutants.settings import Resettles
+from tests.protocol.conformance.mutants.mutant import MOTIONS, Line, Mutant, Rereads, caught_by, value_of
 
 
-class Rereads(Mutant):
-    """Carries a motion command out as another one."""
+class Scales(Mutant):
+    """Moves with other S and A than were set."""
 
-    def instead(self, command: Command) -> Command | None:
-        raise NotImplementedError
+    speed_percent = rate_percent = 100
 
-    def _reply(self, command: Line) -> bytes:
-        if isinstance(command, Command) and command.verb in {Verb.MOVE_TO, Verb.MOVE_BY}:
-            changed = self.instead(command)
-            return b"OK\r" if changed is None else super()._reply(changed)
-        return super()._reply(command)
-
-
-def value_of(command: Command) -> Decimal:
-    assert command.value is not None
-    return command.value
-
-
-@caught_by("4.4/1")
-class ShortWayRound(Rereads):
-    """P takes the short way round"""
-
-    def instead(self, command: Command) -> Command:
-        if command.verb is Verb.MOVE_BY:
-            return command
-        turns = round((value_of(command) - self.position()) / 360)
-        return Command(Verb.MOVE_TO, value_of(command) - 360 * turns)
-
-
-@caught_by("4.5/1")
-class IncrementFromTheOldTarget(Rereads):
-    """R counts from the old target"""
-
-    def instead(self, command: Command) -> Command:
-        return Command(Verb.MOVE_TO, self.target() + value_of(command)) if command.verb is Verb.MOVE_BY else command
-
-
-@caught_by("4.5/2")
-class IncrementFromTheDisplay(Rereads):
-    """R counts from the position as it is told"""
-
-    def instead(self, command: Command) -> Command:
-        if command.verb is Verb.MOVE_TO:
-            return command
-        return Command(Verb.MOVE_TO, round(self.position(), 1) + value_of(command))
-
-
-@caught_by("4.5/3")
-class IgnoresNothing(Rereads):
-    """R 0 is passed over as nothing to do"""
-
-    def instead(self, command: Command) -> Command | None:
-        return None if command.verb is Verb.MOVE_BY and value_of(command) == 0 else command
-
-
-@caught_by("7.3/1")
-class FinishesFirst(Rereads):
-    """a target that comes in a motion is passed over"""
-
-    def instead(self, command: Command) -> Command | None:
-        return None if self.moving and command.verb is Verb.MOVE_TO else command
-
-
-@caught_by("7.3/2")
-class StepsAtPreemption(Rereads):
-    """at a new target the reference's speed steps to 0"""
-
-    def instead(self, command: Command) -> Command:
-        controller = self._state.firmware
-        standing = controller._replace(reference=controller.reference._replace(speed=0))
-        self._state = self._state._replace(firmware=standing)
-        return command
-
-
-@caught_by("7.3/4")
-class StepsToALowerSpeed(Resettles):
-    """a lower S is taken in one step"""
+    def scaled(self, command: Command) -> tuple[int, int]:  # noqa: ARG002 - others look at it
+        """Return the speed and the acceleration with which it moves."""
+        speed, acceleration, _ = self._registers
+        return speed * self.speed_percent // 100, acceleration * self.rate_percent // 100
 
     def _reply(self, command: Line) -> bytes:
+        if not isinstance(command, Command) or command.verb not in MOTIONS:
+            return super()._reply(command)
+        kept = self._registers
+        speed, acceleration = self.scaled(command)
+        self._registers = kept._replace(speed=speed, acceleration=acceleration)
         reply = super()._reply(command)
-        if verb_of(command) is Verb.MOVE_TO:
-            controller, top = self._state.firmware, self._registers.speed
-            slowed = controller.reference._replace(speed=max(-top, min(top, controller.reference.speed)))
-            self._state = self._state._replace(firmware=controller._replace(reference=slowed))
+        self._registers = kept
         return reply
-
-
-@caught_by("7.3/5")
-class KeepsTheOldAcceleration(Resettles):
-    """a new A waits until the table rests"""
-
-    def _reply(self, command: Line) -> bytes:
-        before, was_moving = self._state.firmware.profile.acceleration, self.moving
-        reply = super()._reply(command)
-        if was_moving and verb_of(command) is Verb.MOVE_TO:
-            self.rerun(self._registers.speed, before)
-        return reply
-
-
-@caught_by("7.3/7")
-class QueuesMotions(Rereads):
-    """motions are carried out one after the other"""
-
-    queue: tuple[Command, ...] = ()
-
-    def instead(self, command: Command) -> Command | None:
-        if self.moving:
-            self.queue += (command,)
-            return None
-        return command
-
-    def advance(self, ticks: int) -> None:
-        super().advance(ticks)
-        if self.queue and not self.moving:
-            first, *rest = self.queue
-            self.queue = tuple(rest)
-            self._reply(first)
 
 
 @caught_by("7.1/1")
-class TooFast(Rereads):
+class TooFast(Scales):
     """it is a twentieth too fast"""
 
-    def instead(self, command: Command) -> Command:
-        self._registers = self._registers._replace(speed=self._registers.speed * 105 // 100)
-        return command
+    says = "top speed"
+    speed_percent = 105
 
-    def _reply(self, command: Line) -> bytes:
-        speed = self._registers.speed
-        reply = super()._reply(command)
-        if verb_of(command) in {Verb.MOVE_TO, Verb.MOVE_BY}:
-            self._registers = self._registers._replace(speed=speed)
-        return reply
+
+@caught_by("7.1/1:backwards")
+class LazyBackwards(Scales):
+    """backwards it accelerates a seventh less than A"""
+
+    says = "acceleration"
+    rate_percent = 85
+
+    def scaled(self, command: Command) -> tuple[int, int]:
+        backwards = value_of(command) < (self.position() if command.verb is Verb.MOVE_TO else 0)
+        return super().scaled(command) if backwards else self._registers[:2]
+
+
+@caught_by("7.1/2")
+class NoTriangles(Scales):
+    """a short way is a trapezoid too, with a lower speed"""
+
+    def scaled(self, command: Command) -> tuple[int, int]:
+        speed, acceleration, _ = self._registers
+        way = abs(value_of(command) - (self.target() if command.verb is Verb.MOVE_TO else 0))
+        peak = isqrt(acceleration * int(way * 512) << POSITION_BITS)
+        return max(1, min(speed, peak * 3 // 4)), acceleration
 
 
 @caught_by("7.1/3")
-class LazyTriangles(Rereads):
+class SlowClock(Scales):
+    """its seconds are 3 % too long"""
+
+    says = "duration"
+    speed_percent, rate_percent = 97, 94
+
+
+@caught_by("7.1/3:triangle")
+class LazyTriangles(Scales):
     """it accelerates a sixth less than A"""
 
-    def _reply(self, command: Line) -> bytes:
-        rate = self._registers.acceleration
-        if verb_of(command) in {Verb.MOVE_TO, Verb.MOVE_BY}:
-            self._registers = self._registers._replace(acceleration=rate * 5 // 6)
-        reply = super()._reply(command)
-        if verb_of(command) in {Verb.MOVE_TO, Verb.MOVE_BY}:
-            self._registers = self._registers._replace(acceleration=rate)
-        return reply
+    says = "duration"
+    rate_percent = 83
 
-    def instead(self, command: Command) -> Command:
-        return command
+
+@caught_by("7.1/5")
+class RoundsTheSpeedUp(Scales):
+    """S is rounded up to the next step of its timer, a fifth above"""
+
+    says = "highest speed"
+    speed_percent = 120
 
 
 @caught_by("7.2/2")
 class StopsShort(Rereads):
     """it stops a fifth of a degree short"""
 
+    says = "from the target"
+    short_deg = Decimal("0.2")
+
     def instead(self, command: Command) -> Command:
         if command.verb is Verb.MOVE_BY:
             return command
         way = value_of(command) - self.position()
-        short = Decimal("0.2") if way > 1 else Decimal("-0.2") if way < -1 else Decimal(0)
+        short = self.short_deg * ((way > 1) - (way < -1))
         return Command(Verb.MOVE_TO, value_of(command) - short)
 
 
-@caught_by("6.1/3")
-class StopsAtTheEndOfTheCounter(Rereads):
-    """at the end of the counter it stops"""
+class InTwoSteps(StopsShort):
+    """Stops beside its target, and then goes on to it, with a share of S."""
 
-    def instead(self, command: Command) -> Command | None:
-        beyond = abs(self._state.firmware.counts[-1] + int(value_of(command) * 512)) >= 2**31
-        return None if command.verb is Verb.MOVE_BY and beyond else command
-
-
-class PassesOverFarOnes(Rereads):
-    """Says `OK` to what leads out of the counter, and does nothing."""
-
-    verb = Verb.MOVE_TO
-
-    def instead(self, command: Command) -> Command | None:
-        return None if command.verb is self.verb and abs(value_of(command)) >= 2**22 else command
-
-
-@caught_by("4.4/2")
-class PassesOverFarTargets(PassesOverFarOnes):
-    """a position beyond the counter is passed over, not refused"""
-
-
-@caught_by("4.5/5")
-class PassesOverFarIncrements(PassesOverFarOnes):
-    """an increment beyond the counter is passed over, not refused"""
-
-    verb = Verb.MOVE_BY
-
-
-@caught_by("4.5/4")
-class TakesNothingForALittle(Rereads):
-    """R 0 turns it by a fifth of a degree"""
+    second: Command | None = None
+    slower = 1
 
     def instead(self, command: Command) -> Command:
-        nothing = command.verb is Verb.MOVE_BY and value_of(command) == 0
-        return Command(Verb.MOVE_BY, Decimal("0.2")) if nothing else command
+        first = super().instead(command)
+        self.second = command if first != command else None
+        return first
+
+    def advance(self, ticks: int) -> None:
+        super().advance(ticks)
+        if self.second is not None and not self.moving:
+            Mutant._reply(self, self.second)  # noqa: SLF001 - not to be read otherwise again
+            self.rerun(self._registers.speed // self.slower, self._registers.acceleration)
+            self.second = None
+
+
+@caught_by("7.1/4")
+class Overshoots(InTwoSteps):
+    """it passes its target by a third of a degree, and comes back"""
+
+    says = "farthest position"
+    short_deg = Decimal("-0.33")
+
+
+@caught_by("7.2/3")
+class CreepsHome(InTwoSteps):
+    """the last third of a degree takes it three seconds"""
+
+    says = "settling"
+    short_deg = Decimal("0.33")
+    slower = 400
+
+
+@caught_by("7.2/1")
+class CreepsOn(InTwoSteps):
+    """after a motion it creeps on"""
+
+    says = "at rest the table was read at"
+    slower = 200
+
+    def instead(self, command: Command) -> Command:
+        self.second = Command(Verb.MOVE_BY, Decimal(1))
+        return command
 
 
 @caught_by("7.2/4")
@@ -221,15 +158,3 @@ class Drifts(Rereads):
         if command.verb is Verb.MOVE_BY:
             return command
         return Command(Verb.MOVE_TO, value_of(command) + self.motions * Decimal("0.02"))
-
-
-@caught_by("7.3/6")
-class BeginsAgain(Rereads):
-    """the same target again makes it begin from speed 0"""
-
-    def instead(self, command: Command) -> Command:
-        controller = self._state.firmware
-        if self.moving and command.verb is Verb.MOVE_TO and value_of(command) == self.target():
-            standing = controller._replace(reference=controller.reference._replace(speed=0))
-            self._state = self._state._replace(firmware=standing)
-        return command

@@ -6,11 +6,14 @@ from decimal import Decimal
 from emulator.config import TableConfig, load_config
 from emulator.firmware import MOVING, SETTLING
 from emulator.fixed_point import POSITION_BITS
+from emulator.profiler import Profile
 from emulator.protocol_emulator import Serial
 from emulator.table import Table
 from protocol.messages import Command, ErrorCode, Verb
 
 Line = Command | ErrorCode
+
+MOTIONS = {Verb.MOVE_TO, Verb.MOVE_BY}
 
 
 def port_to(kind: type[Table], config: TableConfig | None = None) -> Serial:
@@ -24,8 +27,16 @@ def verb_of(line: Line) -> Verb | None:
     return line.verb if isinstance(line, Command) else None
 
 
+def value_of(command: Command) -> Decimal:
+    assert command.value is not None
+    return command.value
+
+
 class Mutant(Table):
     """Short ways to the table's inside."""
+
+    says = ""
+    """Words that the case has for what is wrong."""
 
     @property
     def moving(self) -> bool:
@@ -39,14 +50,46 @@ class Mutant(Table):
         fixed = (reference.position_count + reference.distance_count << POSITION_BITS) + reference.fraction
         return Decimal(fixed + reference.distance_fraction) / (1 << POSITION_BITS) / 512
 
+    def braking_way(self) -> Decimal:
+        """How far the reference still goes when it brakes now with the acceleration of its motion."""
+        speed, acceleration = self._state.firmware.reference.speed, self._state.firmware.profile.acceleration
+        return Decimal(speed * abs(speed) // (2 * acceleration)) / (1 << POSITION_BITS) / 512
+
+    def rerun(self, speed: int, acceleration: int) -> None:
+        """Give the running motion another profile."""
+        controller = self._state.firmware
+        self._state = self._state._replace(firmware=controller._replace(profile=Profile.of(speed, acceleration)))
+
+    def step_to(self, speed: int) -> None:
+        """Let the reference have another speed at once."""
+        controller = self._state.firmware
+        stepped = controller._replace(reference=controller.reference._replace(speed=speed))
+        self._state = self._state._replace(firmware=stepped)
+
+
+class Rereads(Mutant):
+    """Carries a motion command out as another one, or says `OK` and passes it over."""
+
+    def instead(self, command: Command) -> Command | None:
+        raise NotImplementedError
+
+    def _reply(self, command: Line) -> bytes:
+        if isinstance(command, Command) and command.verb in MOTIONS:
+            changed = self.instead(command)
+            return b"OK\r" if changed is None else super()._reply(changed)
+        return super()._reply(command)
+
 
 MUTANTS: dict[str, tuple[str, type[Mutant]]] = {}
 """By what is wrong: the case that catches it, and the table."""
 
 
 def caught_by(case: str) -> Callable[[type[Mutant]], type[Mutant]]:
+    """Register a wrong table with the id of the very case that is there to catch it."""
+
     def register(kind: type[Mutant]) -> type[Mutant]:
         assert kind.__doc__
+        assert kind.__doc__ not in MUTANTS
         MUTANTS[kind.__doc__] = (case, kind)
         return kind
 

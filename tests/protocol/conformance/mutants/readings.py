@@ -6,6 +6,16 @@ from protocol.messages import Command, Verb
 from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by, verb_of
 
 
+@caught_by("4.2/1")
+class TellsTheTarget(Mutant):
+    """H tells where the table is going to"""
+
+    def _reply(self, command: Line) -> bytes:
+        if verb_of(command) is Verb.READ_POSITION:
+            return b"H %.1f\r" % (round(self.target(), 1) + 0)
+        return super()._reply(command)
+
+
 @caught_by("4.2/2")
 class StalePosition(Mutant):
     """the position is looked up ten times a second"""
@@ -30,6 +40,24 @@ class Modulo360(Mutant):
         return super()._reply(command)
 
 
+@caught_by("4.2/4")
+class ReadingLatches(Mutant):
+    """the position is read by way of the latch, which keeps it"""
+
+    def _reply(self, command: Line) -> bytes:
+        if verb_of(command) is Verb.READ_POSITION:
+            self.trigger()
+        return super()._reply(command)
+
+
+@caught_by("4.3/1")
+class AnswersLWithH(Mutant):
+    """L is answered with an H"""
+
+    def _reply(self, command: Line) -> bytes:
+        return super()._reply(command).replace(b"L", b"H")
+
+
 @caught_by("4.3/2")
 class ReadingClearsTheLatch(Mutant):
     """reading clears the latch"""
@@ -48,6 +76,16 @@ class LatchIsThePosition(Mutant):
     def _reply(self, command: Line) -> bytes:
         if verb_of(command) is Verb.READ_LATCH:
             return super()._reply(Command(Verb.READ_POSITION)).replace(b"H", b"L")
+        return super()._reply(command)
+
+
+@caught_by("5.2/1")
+class LatchInCounts(Mutant):
+    """L tells the latch in counts"""
+
+    def _reply(self, command: Line) -> bytes:
+        if verb_of(command) is Verb.READ_LATCH:
+            return b"L %d\r" % self._registers.latched_count
         return super()._reply(command)
 
 
@@ -71,6 +109,23 @@ class MinusZero(Renders):
 
     def form(self, angle: Decimal) -> str:
         return f"{float(angle):.1f}"
+
+
+@caught_by("5.2/5:motion")
+class MinusZeroOnTheWay(MinusZero):
+    """-0.0 while it moves"""
+
+    def form(self, angle: Decimal) -> str:
+        return super().form(angle if self.moving else round(angle, 1) + 0)
+
+
+@caught_by("5.2/1:negative")
+class LosesTheSign(Renders):
+    """the sign goes with the whole degrees: -0.5 is 0.5"""
+
+    def form(self, angle: Decimal) -> str:
+        tenths = int(round(angle, 1) * 10)
+        return f"{int(tenths / 10)}.{abs(tenths) % 10}"
 
 
 @caught_by("5.2/3")

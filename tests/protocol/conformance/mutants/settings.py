@@ -2,21 +2,12 @@
 
 from decimal import Decimal
 
-from emulator.profiler import Profile
 from protocol.messages import Command, Verb
-from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by, verb_of
-
-
-class Resettles(Mutant):
-    """Gives the running motion another profile."""
-
-    def rerun(self, speed: int, acceleration: int) -> None:
-        controller = self._state.firmware
-        self._state = self._state._replace(firmware=controller._replace(profile=Profile.of(speed, acceleration)))
+from tests.protocol.conformance.mutants.mutant import MOTIONS, Line, Mutant, caught_by, value_of, verb_of
 
 
 @caught_by("4.6/2")
-class SpeedAtOnce(Resettles):
+class SpeedAtOnce(Mutant):
     """S acts at once on the running motion"""
 
     def _reply(self, command: Line) -> bytes:
@@ -27,7 +18,7 @@ class SpeedAtOnce(Resettles):
 
 
 @caught_by("4.7/2")
-class AccelerationAtOnce(Resettles):
+class AccelerationAtOnce(Mutant):
     """A acts at once on the running motion"""
 
     def _reply(self, command: Line) -> bytes:
@@ -44,7 +35,7 @@ class ForgetsAfterAMotion(Mutant):
 
     def _reply(self, command: Line) -> bytes:
         reply = super()._reply(command)
-        if verb_of(command) in {Verb.MOVE_TO, Verb.MOVE_BY}:
+        if verb_of(command) in MOTIONS:
             fresh = self._interpreter.power_on()
             self._registers = self._registers._replace(**{self.forgotten: getattr(fresh, self.forgotten)})
         return reply
@@ -65,16 +56,27 @@ class ForgetsTheAcceleration(ForgetsAfterAMotion):
 
 
 class WakesOtherwise(Mutant):
-    """Wakes with other settings."""
+    """Wakes with half of what a setting should be."""
+
+    halved = ""
 
     def reset(self, count: int = 0) -> None:
         super().reset(count)
-        self._registers = self._registers._replace(speed=self._registers.speed // 2)
+        self._registers = self._registers._replace(**{self.halved: getattr(self._registers, self.halved) // 2})
 
 
 @caught_by("4.6/5")
 class WakesSlow(WakesOtherwise):
     """at power-on the speed is another"""
+
+    halved = "speed"
+
+
+@caught_by("4.7/5")
+class WakesLazy(WakesOtherwise):
+    """at power-on the acceleration is another"""
+
+    halved = "acceleration"
 
 
 @caught_by("6.1/5")
@@ -85,22 +87,26 @@ class KeepsItsCount(Mutant):
         super().reset(count or self._state.firmware.counts[-1])
 
 
-@caught_by("4.7/5")
-class WakesLazy(Mutant):
-    """at power-on the acceleration is another"""
+class TakesNothingForLittle(Mutant):
+    """Accepts a setting that rounds to nothing."""
 
-    def reset(self, count: int = 0) -> None:
-        super().reset(count)
-        self._registers = self._registers._replace(acceleration=self._registers.acceleration // 2)
+    verb = Verb.SET_SPEED
+
+    def _reply(self, command: Line) -> bytes:
+        tiny = isinstance(command, Command) and command.verb is self.verb and 0 < value_of(command) < Decimal("1e-9")
+        return b"OK\r" if tiny else super()._reply(command)
 
 
 @caught_by("4.6/4")
-class TakesNothingForLittle(Mutant):
+class TakesNoSpeedForLittle(TakesNothingForLittle):
     """a speed that rounds to nothing is accepted"""
 
-    def _reply(self, command: Line) -> bytes:
-        tiny = isinstance(command, Command) and command.value is not None and 0 < command.value < Decimal("1e-9")
-        return b"OK\r" if tiny else super()._reply(command)
+
+@caught_by("4.7/4")
+class TakesNoAccelerationForLittle(TakesNothingForLittle):
+    """an acceleration that rounds to nothing is accepted"""
+
+    verb = Verb.SET_ACCELERATION
 
 
 @caught_by("4.7/3")
@@ -108,6 +114,6 @@ class CutsToItsLimit(Mutant):
     """an acceleration above the limit is taken for the limit"""
 
     def _reply(self, command: Line) -> bytes:
-        if isinstance(command, Command) and command.verb is Verb.SET_ACCELERATION and command.value is not None:
-            command = Command(command.verb, min(command.value, Decimal(100)))
+        if isinstance(command, Command) and command.verb is Verb.SET_ACCELERATION:
+            command = Command(command.verb, min(value_of(command), Decimal(100)))
         return super()._reply(command)

@@ -1,6 +1,7 @@
-"""Wrong tables: the trigger, and the way back from a half line."""
+"""Wrong tables: the trigger."""
 
-from tests.protocol.conformance.mutants.mutant import Mutant, caught_by
+from protocol.messages import Verb
+from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by, verb_of
 
 
 @caught_by("6.2/1")
@@ -23,6 +24,39 @@ class LatchesOnce(Mutant):
         self.latched = True
 
 
+@caught_by("6.2/2")
+class WaitsToBeRead(Mutant):
+    """a trigger is passed over until the last one was read"""
+
+    unread = False
+
+    def trigger(self, fraction: float = 0.0) -> None:
+        if not self.unread:
+            super().trigger(fraction)
+        self.unread = True
+
+    def _reply(self, command: Line) -> bytes:
+        self.unread = self.unread and verb_of(command) is not Verb.READ_LATCH
+        return super()._reply(command)
+
+
+@caught_by("6.2/2:power-on")
+class FollowsUntilTriggered(Mutant):
+    """until the first trigger L reads the position"""
+
+    triggered = False
+
+    def trigger(self, fraction: float = 0.0) -> None:
+        super().trigger(fraction)
+        self.triggered = True
+
+    def _reply(self, command: Line) -> bytes:
+        if verb_of(command) is Verb.READ_LATCH and not self.triggered:
+            self.trigger()
+            self.triggered = False
+        return super()._reply(command)
+
+
 @caught_by("6.2/3")
 class SpeaksAtTriggers(Mutant):
     """a trigger is answered"""
@@ -30,11 +64,3 @@ class SpeaksAtTriggers(Mutant):
     def trigger(self, fraction: float = 0.0) -> None:
         super().trigger(fraction)
         self._serial.write(b"TRIG\r", self.tick)
-
-
-@caught_by("8.3/1")
-class CancelIsIgnored(Mutant):
-    """CAN is passed over, and the half line carried out"""
-
-    def receive(self, data: bytes) -> None:
-        super().receive(data.replace(b"\x18", b""))

@@ -1,0 +1,115 @@
+"""Wrong tables: the target of a motion."""
+
+from decimal import Decimal
+
+from protocol.messages import Command, Verb
+from tests.protocol.conformance.mutants.mutant import Line, Mutant, Rereads, caught_by, value_of, verb_of
+
+
+@caught_by("4.4/1")
+class ShortWayRound(Rereads):
+    """P takes the short way round"""
+
+    def instead(self, command: Command) -> Command:
+        if command.verb is Verb.MOVE_BY:
+            return command
+        turns = round((value_of(command) - self.position()) / 360)
+        return Command(Verb.MOVE_TO, value_of(command) - 360 * turns)
+
+
+@caught_by("6.1/4")
+class SparesItsCable(Rereads):
+    """backwards it turns by half a turn at most"""
+
+    def instead(self, command: Command) -> Command:
+        if command.verb is Verb.MOVE_BY:
+            return command
+        return Command(Verb.MOVE_TO, max(value_of(command), self.target() - 180))
+
+
+@caught_by("4.4/4")
+class OkIsArrival(Mutant):
+    """P is answered once the table is there"""
+
+    says = "was there with its OK"
+    held = b""
+
+    def _reply(self, command: Line) -> bytes:
+        reply = super()._reply(command)
+        if verb_of(command) is Verb.MOVE_TO:
+            reply, self.held = b"", reply
+        return reply
+
+    def ticks_until_byte(self) -> int | None:
+        return 1 if self.held else super().ticks_until_byte()
+
+    def advance(self, ticks: int) -> None:
+        super().advance(ticks)
+        if self.held and not self.moving:
+            self._serial.write(self.held, self.tick)
+            self.held = b""
+
+
+@caught_by("4.5/1")
+class IncrementFromTheOldTarget(Rereads):
+    """R counts from the old target"""
+
+    def instead(self, command: Command) -> Command:
+        return Command(Verb.MOVE_TO, self.target() + value_of(command)) if command.verb is Verb.MOVE_BY else command
+
+
+@caught_by("4.5/2")
+class IncrementFromTheDisplay(Rereads):
+    """R counts from the position as it is told"""
+
+    def instead(self, command: Command) -> Command:
+        if command.verb is Verb.MOVE_TO:
+            return command
+        return Command(Verb.MOVE_TO, round(self.position(), 1) + value_of(command))
+
+
+@caught_by("4.5/3")
+class IgnoresNothing(Rereads):
+    """R 0 is passed over as nothing to do"""
+
+    def instead(self, command: Command) -> Command | None:
+        return None if command.verb is Verb.MOVE_BY and value_of(command) == 0 else command
+
+
+@caught_by("4.5/4")
+class TakesNothingForALittle(Rereads):
+    """R 0 turns it by a fifth of a degree"""
+
+    def instead(self, command: Command) -> Command:
+        nothing = command.verb is Verb.MOVE_BY and value_of(command) == 0
+        return Command(Verb.MOVE_BY, Decimal("0.2")) if nothing else command
+
+
+class PassesOverFarOnes(Rereads):
+    """Says `OK` to what leads out of the counter, and does nothing."""
+
+    verb = Verb.MOVE_TO
+
+    def instead(self, command: Command) -> Command | None:
+        return None if command.verb is self.verb and abs(value_of(command)) >= 2**22 else command
+
+
+@caught_by("4.4/2")
+class PassesOverFarTargets(PassesOverFarOnes):
+    """a position beyond the counter is passed over, not refused"""
+
+
+@caught_by("4.5/5")
+class PassesOverFarIncrements(PassesOverFarOnes):
+    """an increment beyond the counter is passed over, not refused"""
+
+    verb = Verb.MOVE_BY
+
+
+@caught_by("6.1/3")
+class StopsAtTheEndOfTheCounter(Rereads):
+    """at the end of the counter it stops"""
+
+    def instead(self, command: Command) -> Command | None:
+        beyond = abs(self._state.firmware.counts[-1] + int(value_of(command) * 512)) >= 2**31
+        return None if command.verb is Verb.MOVE_BY and beyond else command
