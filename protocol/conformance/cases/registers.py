@@ -4,6 +4,7 @@ from protocol.conformance.case import case
 from protocol.conformance.rig import Rig
 from protocol.conformance.stand import POWER_CYCLE, PRESET, TRIGGER
 from protocol.conformance.verdict import require
+from protocol.conformance.wire_checks import number
 
 
 @case("6.1/1", TRIGGER, travel_deg=10)
@@ -15,6 +16,18 @@ def position_and_latch_are_two_registers(rig: Rig) -> None:
     rig.finish()
     later = rig.read(b"L")
     require(later == latched, f"the latch went from {latched} to {later} deg without a trigger")
+
+
+@case("6.1/2", PRESET, travel_deg=5)
+def a_position_is_exact_at_both_ends(rig: Rig) -> None:
+    """Preset the counter near each of its ends, and move to a position nearer still."""
+    last = rig.profile.range_deg
+    for begin, target in ((last - 5, last - 1.7), (5 - last, 1.7 - last)):
+        rig.stand.preset(round(begin * rig.profile.table.counts_per_deg))
+        rig.full_settings()
+        rig.expect(b"P " + number(target))
+        rig.wait_for_rest()
+        rig.measure(f"from {target:.1f}", float(rig.read()) - target, "deg", *rig.near(0))
 
 
 @case("6.1/3", PRESET, travel_deg=10)

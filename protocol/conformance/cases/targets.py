@@ -2,6 +2,7 @@
 
 from protocol.conformance.case import case
 from protocol.conformance.rig import Rig
+from protocol.conformance.stand import PRESET
 from protocol.conformance.verdict import require
 from protocol.conformance.wire_checks import number
 from protocol.messages import ErrorCode
@@ -23,6 +24,15 @@ def a_position_beyond_the_counter_is_refused(rig: Rig) -> None:
     with rig.unmoved(b"a position beyond the counter"):
         for target in (rig.profile.range_deg, 2 * rig.profile.range_deg, -rig.profile.range_deg - 0.1):
             rig.refused(b"P " + number(target), _OUT_OF_RANGE)
+
+
+@case("4.4/3", PRESET)
+def a_motion_beyond_half_the_counter_is_refused(rig: Rig) -> None:
+    """Preset the counter far up, and command a position far down: the counter has both, but the way is too long."""
+    far_deg = 0.75 * rig.profile.range_deg
+    rig.stand.preset(round(far_deg * rig.profile.table.counts_per_deg))
+    with rig.unmoved(b"a motion beyond half the counter"):
+        rig.refused(b"P " + number(-far_deg), _OUT_OF_RANGE)
 
 
 @case("4.4/4", travel_deg=10)

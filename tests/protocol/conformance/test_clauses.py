@@ -10,9 +10,7 @@ from protocol.conformance.clauses import specification
 PAGE = Path(__file__).parents[3] / "docs" / "protocol.md"
 
 NOT_FOR_A_TABLE = {
-    "4.4/3": "a motion longer than half the counter's range cannot be told from a position beyond it at home",
     "4.5/6": "an increment over the counter's end is the case of 6.1/3",
-    "6.1/2": "the range of a register is shown at both its ends by 4.4/2 and 6.1/3",
     "7.2/5": "no rig should have a motor protect itself for a test",
 }
 

@@ -106,6 +106,24 @@ class PassesOverFarIncrements(PassesOverFarOnes):
     verb = Verb.MOVE_BY
 
 
+@caught_by("4.4/3")
+class GoesAcrossTheEnd(Rereads):
+    """to a position too far away it goes the other way, across the end of the counter"""
+
+    def instead(self, command: Command) -> Command:
+        way = value_of(command) - self.target()
+        too_far = command.verb is Verb.MOVE_TO and abs(way) >= 2**22 and abs(value_of(command)) < 2**22
+        return Command(Verb.MOVE_BY, way - Decimal(2**23).copy_sign(way)) if too_far else command
+
+
+@caught_by("6.1/2")
+class ThreeBytes(Rereads):
+    """a position that does not fit three bytes is out of its range"""
+
+    def instead(self, command: Command) -> Command:
+        return Command(command.verb, Decimal(2**32)) if abs(value_of(command)) * 512 >= 2**23 else command
+
+
 @caught_by("6.1/3")
 class StopsAtTheEndOfTheCounter(Rereads):
     """at the end of the counter it stops"""
