@@ -19,8 +19,8 @@ def a_letter_begins_a_line(rig: Rig) -> None:
 @case("4.1/2")
 def spaces_are_free(rig: Rig) -> None:
     """Put spaces, or none, where they may stand."""
-    speed = number(rig.profile.motion.speed_deg_s)
-    for line in (b"S" + speed, b"S   " + speed, b"S " + speed + b"   "):
+    speed, rate = number(rig.profile.motion.speed_deg_s), number(rig.profile.motion.acceleration_deg_s2)
+    for line in (b"S" + speed, b"A" + rate, b"R0", b"R-0", b"S   " + speed, b"S " + speed + b"   "):
         rig.expect(line)
     rig.angle_in(rig.ask(b"H   "))
 
@@ -42,7 +42,9 @@ def a_setting_takes_exactly_one_number(rig: Rig) -> None:
 
 @case("4.1/5", travel_deg=2)
 def a_number_may_have_a_sign(rig: Rig) -> None:
-    """Send `+` and `-` with increments that add up to nothing, and `-0`."""
+    """Send `+` and `-` with increments that add up to nothing, and `-0`; and `+` with the settings."""
+    rig.expect(b"S +" + number(rig.profile.motion.speed_deg_s))
+    rig.expect(b"A +" + number(rig.profile.motion.acceleration_deg_s2))
     rig.expect(b"R +2")
     rig.wait_for_rest()
     rig.measure("after R +2", float(rig.read()) - rig.home_deg, "deg", *rig.near(2))
@@ -96,6 +98,8 @@ def a_refused_line_changes_nothing(rig: Rig) -> None:
         (b"R x", _BAD_NUMBER),
         (b"S 0", _OUT_OF_RANGE),
         (b"A 0", _OUT_OF_RANGE),
+        (b"S 9999999", _OUT_OF_RANGE),
+        (b"A 9999999", _OUT_OF_RANGE),
         (b"P 0 0", _BAD_NUMBER),
         (b"R 0\x18", ErrorCode.BAD_BYTE),
         (b"p 0", ErrorCode.UNKNOWN_COMMAND),

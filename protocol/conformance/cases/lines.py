@@ -67,8 +67,8 @@ def a_line_of_full_length_is_accepted(rig: Rig) -> None:
 
 @case("3.2/2")
 def a_longer_line_is_refused(rig: Rig) -> None:
-    """Send lines of 33 and of 500 bytes, and 33 spaces."""
-    for line in (b"H".ljust(LINE_LIMIT + 1), b"H" * 33, b"P" + b" " * 499, b" " * (LINE_LIMIT + 1)):
+    """Send lines of 33, of 257 (which a byte counts as 1) and of 500 bytes, and 33 spaces."""
+    for line in (b"H".ljust(LINE_LIMIT + 1), b"H" * 33, b"H".ljust(257), b"P".ljust(500), b" " * (LINE_LIMIT + 1)):
         rig.refused(line, ErrorCode.LINE_TOO_LONG)
     rig.read()
 
@@ -76,7 +76,7 @@ def a_longer_line_is_refused(rig: Rig) -> None:
 @case("3.2/3")
 def a_bad_byte_spoils_its_line(rig: Rig) -> None:
     """Send lines with bytes that are not printable ASCII, at every place."""
-    for byte in (0x00, 0x04, 0x09, 0x18, 0x1F, 0x7F, 0x80, 0xFF):
+    for byte in (0x00, 0x04, 0x08, 0x09, 0x11, 0x18, 0x1B, 0x1F, 0x7F, 0x80, 0xFF):
         rig.refused(bytes((byte,)) + b"H", ErrorCode.BAD_BYTE)
         rig.refused(b"H" + bytes((byte,)), ErrorCode.BAD_BYTE)
     rig.refused(b"S 1\xb50", ErrorCode.BAD_BYTE)

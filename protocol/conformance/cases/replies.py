@@ -195,9 +195,11 @@ def _expect_words(rig: Rig, line: bytes, code: ErrorCode) -> None:
 
 
 def _expect_rounded(rig: Rig, count: int) -> None:
-    """Preset the counter, and require the reading that rounding to the even digit gives."""
+    """Preset the counter, and with it the latch, and require the readings that rounding to the even digit gives."""
     rig.stand.preset(count)
     angle = Decimal(count) / Decimal(repr(rig.profile.table.counts_per_deg))
     wanted = angle.quantize(Decimal(1).scaleb(-rig.profile.serial.decimals), ROUND_HALF_EVEN)
-    got = rig.read()
-    require(got == wanted, f"a count of {count}, {angle:.6f} deg, was read as {got}, not {wanted + 0}")
+    for letter in (b"H", b"L"):
+        got = rig.read(letter)
+        said = f"a count of {count}, {angle:.6f} deg, was read with {letter!r} as {got}, not {wanted + 0}"
+        require(got == wanted, said)

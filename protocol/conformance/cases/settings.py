@@ -2,20 +2,33 @@
 
 from protocol.conformance.case import case
 from protocol.conformance.rig import Rig
-from protocol.conformance.stand import POWER_CYCLE
+from protocol.conformance.stand import DISCONNECT, POWER_CYCLE
 from protocol.conformance.wire_checks import number
 from protocol.messages import ErrorCode
 
 _OUT_OF_RANGE = ErrorCode.OUT_OF_RANGE
 
 
-@case("4.6/1", travel_deg=30)
+@case("4.6/1", travel_deg=20)
 def s_holds_for_the_motions_after_it(rig: Rig) -> None:
-    """Set S once; two motions keep it."""
-    rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2)
-    for target in (15, 30):
-        rig.move_to(target)
-        rig.finish(f"to {target}")
+    """Set S once, with a decimal; a motion with `P` and one with `R` keep it."""
+    rig.settings(rig.profile.motion.speed_deg_s * 5 / 16, rig.profile.motion.acceleration_deg_s2)
+    rig.move_to(10)
+    rig.finish("with P")
+    rig.move_by(10)
+    rig.finish("with R")
+
+
+@case("4.6/1:reconnect", DISCONNECT, travel_deg=20)
+def s_and_a_outlive_a_client(rig: Rig) -> None:
+    """Leave the port in a motion and come back: the motion goes on, and the next one keeps S and A."""
+    rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
+    rig.move_to(20)
+    rig.follow(0.3)
+    rig.wire.reopen()
+    rig.finish("after a new client came")
+    rig.move_to(0)
+    rig.finish("the next motion")
 
 
 @case("4.6/2", travel_deg=30)
@@ -56,11 +69,11 @@ def the_speed_at_power_on(rig: Rig) -> None:
     rig.finish()
 
 
-@case("4.7/1", travel_deg=20)
+@case("4.7/1", travel_deg=15)
 def a_holds_for_the_motions_after_it(rig: Rig) -> None:
-    """Set A once; two motions keep it, both ways."""
-    rig.settings(rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2 / 4)
-    for target in (20, 0):
+    """Set A once, with a decimal; two motions keep it, both ways."""
+    rig.settings(rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2 / 8)
+    for target in (15, 0):
         rig.move_to(target)
         rig.finish(f"to {target}")
 
