@@ -4,7 +4,7 @@ import re
 from decimal import Decimal
 
 from protocol.messages import Command, ErrorCode, Verb
-from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by, verb_of
+from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by, value_of, verb_of
 
 
 @caught_by("4.1/1")
@@ -50,6 +50,16 @@ class StopsWhenItRefuses(Mutant):
         return reply
 
 
+@caught_by("4.1/10")
+class CutsWhatItRefuses(Mutant):
+    """a speed above the limit is refused, and yet cut to the limit"""
+
+    def _reply(self, command: Line) -> bytes:
+        if isinstance(command, Command) and command.verb is Verb.SET_SPEED and value_of(command) > 40:
+            super()._reply(Command(command.verb, Decimal(40)))
+        return super()._reply(command)
+
+
 @caught_by("4.6/3")
 class SaysOkFirst(Mutant):
     """OK comes before the number is looked at"""
@@ -65,6 +75,14 @@ class RefusesSpacesBehind(Mutant):
 
     def receive(self, data: bytes) -> None:
         super().receive(re.sub(rb"([0-9]) +\r", rb"\1x\r", data))
+
+
+@caught_by("4.1/2")
+class NeedsASpace(Mutant):
+    """R and A need a space before their number"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(re.sub(rb"([RA])([0-9])", rb"\1x\2", data))
 
 
 @caught_by("4.1/3")

@@ -78,6 +78,22 @@ class CutsLongLines(Mutant):
         super().receive(b"\r".join(line[:32] for line in data.split(b"\r")))
 
 
+@caught_by("3.2/2")
+class CountsInAByte(Mutant):
+    """the length of a line is a byte, and begins anew after 255"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(re.sub(rb"([^\r])[^\r]{256}\r", rb"\1\r", data))
+
+
+@caught_by("3.2/3")
+class EditsItsLine(Mutant):
+    """a backspace takes the byte before it back, for terminals"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(re.sub(rb"[^\r]?\x08", b"", data))
+
+
 @caught_by("3.2/3")
 class IgnoresBadBytes(Mutant):
     """bad bytes are passed over"""

@@ -95,11 +95,14 @@ class Renders(Mutant):
     def form(self, angle: Decimal) -> str:
         raise NotImplementedError
 
+    reads_latch = False
+
     def _reply(self, command: Line) -> bytes:
         reply = super()._reply(command)
         if reply[:2] not in {b"H ", b"L "}:
             return reply
-        count = self._state.firmware.counts[-1] if reply[:1] == b"H" else self._registers.latched_count
+        self.reads_latch = reply[:1] == b"L"
+        count = self._registers.latched_count if self.reads_latch else self._state.firmware.counts[-1]
         return reply[:2] + self.form(Decimal(count) / 512).encode() + b"\r"
 
 
@@ -134,6 +137,14 @@ class Truncates(Renders):
 
     def form(self, angle: Decimal) -> str:
         return str(angle.quantize(Decimal("0.1"), ROUND_DOWN) + 0)
+
+
+@caught_by("5.2/3")
+class TruncatesTheLatch(Truncates):
+    """the latch is cut, not rounded"""
+
+    def form(self, angle: Decimal) -> str:
+        return super().form(angle if self.reads_latch else round(angle, 1))
 
 
 @caught_by("5.2/4")

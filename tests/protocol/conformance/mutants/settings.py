@@ -55,6 +55,38 @@ class ForgetsTheAcceleration(ForgetsAfterAMotion):
     forgotten = "acceleration"
 
 
+class WholeNumbers(Mutant):
+    """Drops the decimals of a setting."""
+
+    verb = Verb.SET_SPEED
+
+    def _reply(self, command: Line) -> bytes:
+        if isinstance(command, Command) and command.verb is self.verb:
+            command = Command(command.verb, value_of(command) // 1)
+        return super()._reply(command)
+
+
+@caught_by("4.6/1")
+class WholeSpeeds(WholeNumbers):
+    """S has no decimals"""
+
+
+@caught_by("4.7/1")
+class WholeAccelerations(WholeNumbers):
+    """A has no decimals"""
+
+    verb = Verb.SET_ACCELERATION
+
+
+@caught_by("4.6/1:reconnect")
+class ResetsForANewClient(Mutant):
+    """a client that opens the port resets S and A"""
+
+    def disconnect(self) -> None:
+        super().disconnect()
+        self._registers = self._interpreter.power_on()._replace(latched_count=self._registers.latched_count)
+
+
 class WakesOtherwise(Mutant):
     """Wakes with half of what a setting should be."""
 

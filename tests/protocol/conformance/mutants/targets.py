@@ -131,3 +131,16 @@ class StopsAtTheEndOfTheCounter(Rereads):
     def instead(self, command: Command) -> Command | None:
         beyond = abs(self._state.firmware.counts[-1] + int(value_of(command) * 512)) >= 2**31
         return None if command.verb is Verb.MOVE_BY and beyond else command
+
+
+@caught_by("6.1/3")
+class StumblesOverTheEnd(Mutant):
+    """at the end of the counter the reference's speed steps to 0"""
+
+    says = "over the end and back"
+
+    def advance(self, ticks: int) -> None:
+        before = self._state.firmware.reference.position_count
+        super().advance(ticks)
+        if abs(self._state.firmware.reference.position_count - before) > 2**31:
+            self.step_to(0)

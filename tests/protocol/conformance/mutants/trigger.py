@@ -12,6 +12,15 @@ class LatchesLate(Mutant):
         self._triggers.add_edge(self.tick + 100, fraction)
 
 
+@caught_by("6.2/1")
+class LatchesForwards(Mutant):
+    """it latches in motions forwards only"""
+
+    def trigger(self, fraction: float = 0.0) -> None:
+        if self._state.firmware.reference.speed >= 0:
+            super().trigger(fraction)
+
+
 @caught_by("6.2/2")
 class LatchesOnce(Mutant):
     """the first trigger is the last"""
