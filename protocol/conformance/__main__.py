@@ -10,13 +10,13 @@ from typing import NoReturn
 
 from protocol.conformance.case import Case, chosen_cases, only
 from protocol.conformance.host_watch import watch_in
-from protocol.conformance.ports import described, is_simulated, open_port
+from protocol.conformance.ports import SessionError, described, is_simulated, open_port
 from protocol.conformance.profile import Profile, ProfileError, load_profile
 from protocol.conformance.record import Header, RecordError, count_verdicts, read_record, write_junit, write_record
 from protocol.conformance.replay import replay
 from protocol.conformance.report import write_report
 from protocol.conformance.stand import Stand, StandError, stand_beside
-from protocol.conformance.suite import Outcome, Session, SessionError, session_at
+from protocol.conformance.suite import Outcome, Session, session_at
 from protocol.conformance.verdict import Verdict
 from protocol.conformance.wire import RecordedPort, ReopenablePort, Wire
 

@@ -13,10 +13,9 @@ from typing import Self
 import pytest
 
 from protocol.client import TableClient
-from protocol.conformance.ports import open_port
+from protocol.conformance.ports import SessionError, open_port
 from protocol.conformance.profile import Profile, ProfileError, load_profile
 from protocol.conformance.stand import POWER_CYCLE, TRIGGER, Stand, StandError, stand_beside
-from protocol.conformance.suite import SessionError
 from protocol.conformance.wire import ReopenablePort
 from protocol.errors import TableError
 

@@ -3,11 +3,14 @@
 from pathlib import Path
 
 from protocol.conformance.profile import Profile
-from protocol.conformance.suite import SessionError
 from protocol.conformance.wire import ReopenablePort
 
 _STAND_IN_PACKAGE = "emulator"
 """Where pyserial looks for the stand-in's own kind of URL, `emulator://`; it need not be installed."""
+
+
+class SessionError(Exception):
+    """What is at the port cannot be tested; the message says why and what to do."""
 
 
 def open_port(url: str, profile: Profile) -> ReopenablePort:

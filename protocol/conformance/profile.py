@@ -100,6 +100,11 @@ class Profile:
         return float(10.0**-self.serial.decimals)
 
     @property
+    def step_deg(self) -> float:
+        """The least change of position that a reading shows: a unit of the last decimal, or a count if that is more."""
+        return max(self.resolution_deg, 1.0 / self.table.counts_per_deg)
+
+    @property
     def range_deg(self) -> float:
         """The positions that a register holds: from minus this up to this, without it."""
         return 2.0**31 / self.table.counts_per_deg
@@ -201,19 +206,27 @@ def _check_together(profile: Profile, source: str) -> None:
     serial, motion, limits = profile.serial, profile.motion, profile.limits
     unknown = [number for number in profile.waive if number not in specification()]
     musts = [number for number in profile.waive if number not in unknown and specification()[number].level == "must"]
+    unreasoned = [number for number, reason in profile.waive.items() if not reason.strip()]
     checks = (
         (not 1 <= serial.decimals <= 6, f"serial.decimals is {serial.decimals}; it must be 1 to 6"),
         (serial.buffer_bytes < 33, f"serial.buffer_bytes is {serial.buffer_bytes}; a line alone needs 33"),
         (
-            serial.latency_s >= serial.timeout_s,
-            f"serial.timeout_s is {serial.timeout_s:g}; it must be more than serial.latency_s, {serial.latency_s:g}",
+            serial.timeout_s <= serial.latency_s + 32 * profile.byte_s,
+            f"serial.timeout_s is {serial.timeout_s:g}; it must be more than serial.latency_s, {serial.latency_s:g}, "
+            f"and the time of 32 bytes, {32 * profile.byte_s:.2g}",
         ),
         (profile.table.counts_per_deg <= 0, "table.counts_per_deg is 0; it must be greater"),
+        (
+            profile.table.counts_per_deg > 0 and not motion.reach_deg < profile.range_deg,
+            f"motion.reach_deg is {motion.reach_deg:g}; with table.counts_per_deg {profile.table.counts_per_deg:g} "
+            f"the counter ends at {profile.range_deg:g}",
+        ),
         (
             profile.tolerance.tracking_deg <= profile.tolerance.rest_deg,
             f"tolerance.tracking_deg is {profile.tolerance.tracking_deg:g}; it must be more than tolerance.rest_deg, "
             f"{profile.tolerance.rest_deg:g}",
         ),
+        (bool(unreasoned), f"waive.{', '.join(unreasoned)} is empty; it must say why"),
         (bool(unknown), f"waive names {', '.join(unknown)}, which is no clause"),
         (bool(musts), f"waive names {', '.join(musts)}, which is a must; only a should can be waived"),
     )

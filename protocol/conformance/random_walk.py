@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 from hypothesis.errors import HypothesisException
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule, run_state_machine_as_test
 
-from protocol.conformance.ports import is_simulated, open_port
+from protocol.conformance.ports import SessionError, is_simulated, open_port
 from protocol.conformance.rig import Rig
 from protocol.conformance.stand import TRIGGER, stand_beside
-from protocol.conformance.suite import SessionError
 from protocol.conformance.verdict import NonconformityError, require
 from protocol.conformance.wire import RecordedPort, Wire
 from protocol.conformance.wire_checks import number
@@ -63,7 +62,7 @@ def _on_the_stand_in(rig: Rig, chance: int) -> str:
     except SessionError:
         return "there is no stand-in here on which to shrink it"
     stand = stand_beside(port, None, rig.profile)
-    twin = Rig(Wire(RecordedPort(port)), rig.profile, stand, 0, Random(0))  # noqa: S311  # not used
+    twin = Rig(Wire(RecordedPort(port), rig.profile.byte_s), rig.profile, stand, 0, Random(0))  # noqa: S311  # not used
     try:
         _search_and_shrink(twin, chance, _ON_A_PORT)
     except NonconformityError as error:

@@ -17,8 +17,10 @@ _POLL_S = 0.005
 _REST_READINGS = 5
 _REST_INTERVAL_S = 0.05
 _REST_TIMEOUT_S = 30.0
+_READING_BYTES = 10
+"""Of `H` and of a reply with three digits, without its decimals."""
 _LEAST_SHARE = 0.1
-"""The least acceleration that a case sets, as a share of the profile's."""
+"""The least speed and acceleration that a case sets, as a share of the profile's."""
 
 
 class Rig(WireChecks):
@@ -145,10 +147,11 @@ class Rig(WireChecks):
         self.measure(f"{name}: from the trapezoid", worst, "deg", most=self.profile.tolerance.tracking_deg)
 
     def check_rest(self, name: str) -> None:
-        """Measure where the table stands, from the target."""
-        target = self.motion.expectations[-1].motion.target_deg
-        low, high = self.resting_range()
-        self.measure(f"{name}: from the target", float(self.read()) - target, "deg", low - target, high - target)
+        """Measure where the table stands, from the target; that of an increment is as open as its moment."""
+        low, high = self._reference.target_span_deg()
+        position = float(self.read())
+        away = position - min(max(position, low), high)
+        self.measure(f"{name}: from the target", away, "deg", *self.near(0))
 
     def excess(self, sample: Sample) -> float:
         """Return how far a sample is from where the reference can have been, with all times as they may have been."""
@@ -180,10 +183,11 @@ class Rig(WireChecks):
         return readings[-1]
 
     def _readings_at_rest(self) -> int:
-        """Return how many equal readings show a rest: where a slow motion begins or turns back there are several."""
-        rate_deg_s2 = self.rate_deg_s2 or _LEAST_SHARE * self.profile.motion.acceleration_deg_s2
-        turning_s = 2 * sqrt(2 * self.profile.resolution_deg / rate_deg_s2)
-        return max(_REST_READINGS, 2 + ceil(turning_s / _REST_INTERVAL_S))
+        """Return how many equal readings show a rest: a slow motion gives several, most where it turns back."""
+        allowed, step_deg = self.profile.motion, self.profile.step_deg
+        cruising_s = step_deg / (self.top_deg_s or _LEAST_SHARE * allowed.speed_deg_s)
+        turning_s = 2 * sqrt(2 * step_deg / (self.rate_deg_s2 or _LEAST_SHARE * allowed.acceleration_deg_s2))
+        return max(_REST_READINGS, 2 + ceil(max(cruising_s, turning_s) / _REST_INTERVAL_S))
 
     def _move(self, command: bytes, target_from: Callable[[float], float]) -> None:
         """Carry out a motion command, and follow what can come of it."""
@@ -198,6 +202,12 @@ class Rig(WireChecks):
         earliest_s = min(sent_s + byte_count * self.profile.byte_s, reply.first_s)
         latest_s = max(reply.first_s - self.profile.byte_s, earliest_s)
         return Instant((earliest_s + latest_s) / 2, (latest_s - earliest_s) / 2 + self._jitter_s)
+
+    @property
+    def reading_s(self) -> float:
+        """How long it takes at most to read the position: the bytes both ways, and the latency."""
+        serial = self.profile.serial
+        return (_READING_BYTES + serial.decimals) * self.profile.byte_s + serial.latency_s
 
     @property
     def _jitter_s(self) -> float:

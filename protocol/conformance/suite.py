@@ -1,15 +1,15 @@
 """A session with a table: from rest, case after case, back to rest."""
 
-import re
 import traceback
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from decimal import Decimal
 from random import Random
 
 from protocol.conformance.case import Case
+from protocol.conformance.first_contact import CANCEL, PATIENCE_S, SETTLE_S, resting_position
 from protocol.conformance.host_watch import Punctual, Watch
+from protocol.conformance.ports import SessionError
 from protocol.conformance.profile import Profile
 from protocol.conformance.reference import MotionRecord
 from protocol.conformance.rig import Rig
@@ -17,17 +17,12 @@ from protocol.conformance.stand import PRESET, RecordedStand, Stand, StandError,
 from protocol.conformance.verdict import InapplicableError, Measurement, NonconformityError, Verdict
 from protocol.conformance.wire import Event, RecordedPort, Wire
 
-_CANCEL = b"\x18\r"
-_POSITION = re.compile(rb"(?:^|[\r\n])H (-?[0-9]+\.[0-9]+) *\r")
-_SETTLE_S = 0.3
+__all__ = ["Outcome", "Session", "SessionError", "session_at"]
+
 _RUNS = 3
 """How often a case is run when its machine spoils it."""
-_PATIENCE_S = 30.0
-"""How long a busy machine is given to calm down, before such a case is run again."""
-
-
-class SessionError(Exception):
-    """What is at the port cannot be tested; the message says why and what to do."""
+_LONGEST_REASON = 1000
+"""Of a reason that is longer, beginning and end are kept: a table may say anything."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +56,12 @@ class Session:
     ) -> None:
         self._port = port
         self._watch = watch or Punctual()
-        self._wire = Wire(port)
+        self._wire = Wire(port, profile.byte_s)
         self._profile = profile
         self._stand: Stand = RecordedStand(stand, port.note)
         self._seed = seed
         self.capabilities = capabilities(stand, profile)
-        self.home_deg = round(self._first_position_in_time())
+        self.home_deg = round(resting_position(self._wire, profile, self._watch))
         self._is_home = self.is_stopped = False
         self._was_left = False
 
@@ -112,7 +107,7 @@ class Session:
             spoiled.append(f"this machine was {late_s:.2g} s late: {outcome.reason}")
             if len(spoiled) == _RUNS:
                 return replace(outcome, verdict=Verdict.ERROR, reason=spoiled.pop(), spoiled=tuple(spoiled))
-            self._watch.wait_for_calm(allowed_s, _PATIENCE_S)
+            self._watch.wait_for_calm(allowed_s, PATIENCE_S)
             self._recover(case)
 
     def _run_once(self, case: Case) -> Outcome:
@@ -129,8 +124,8 @@ class Session:
         """Stop the table where it is, whatever is on the line, if it still answers."""
         self._is_home = self.is_stopped = False
         with suppress(NonconformityError, OSError):
-            self._wire.send(_CANCEL + b"R 0\r")
-            self._wire.listen(_SETTLE_S)
+            self._wire.send(CANCEL + b"R 0\r")
+            self._wire.drain(SETTLE_S + self._profile.serial.latency_s, PATIENCE_S)
             self._rig("stop").wait_for_rest()
             self.is_stopped = True
 
@@ -170,7 +165,7 @@ class Session:
             return Verdict.SKIPPED, str(error)
         except NonconformityError as error:
             self._after_failure(case, rig)
-            return Verdict.FAIL, str(error)
+            return Verdict.FAIL, _shortened(str(error))
         except StandError as error:
             self._after_failure(case, rig)
             return Verdict.ERROR, str(error)
@@ -217,40 +212,10 @@ class Session:
             self.home_deg = 0
         self.end()
 
-    def _first_position_in_time(self) -> Decimal:
-        """Return where the table rests; a machine that was late is given a second chance to hear it."""
-        self._watch.restart()
-        try:
-            return self._first_position()
-        except SessionError:
-            if self._watch.late_s() <= self._profile.serial.latency_s:
-                raise
-        self._watch.wait_for_calm(self._profile.serial.latency_s, _PATIENCE_S)
-        return self._first_position()
 
-    def _first_position(self) -> Decimal:
-        """Return where the table rests, or say why it cannot be tested."""
-        timeout_s = self._profile.serial.timeout_s
-        self._wire.send(_CANCEL)
-        self._wire.listen(_SETTLE_S)
-        readings = []
-        for _ in range(2):
-            self._wire.send(b"H\r")
-            line = self._wire.read_line(timeout_s)
-            heard = self._wire.forget() if line is None else line.text + b"\r"
-            found = _POSITION.search(heard)
-            if not heard:
-                raise SessionError(
-                    f"no answer to 'H' within {timeout_s:g} s; is the table on, the cable right, "
-                    f"and its rate {self._profile.serial.baud} baud?"
-                )
-            if found is None:
-                raise SessionError(f"'H' got {heard!r}, which is no position; this is no table of this protocol")
-            readings.append(Decimal(found[1].decode()))
-            self._wire.clock.sleep_s(_SETTLE_S)
-        if readings[0] != readings[1]:
-            raise SessionError(f"the table moves ({readings[0]}, then {readings[1]} deg); stop it first")
-        return readings[1]
+def _shortened(reason: str) -> str:
+    half = _LONGEST_REASON // 2
+    return reason if len(reason) <= _LONGEST_REASON else f"{reason[:half]} ... {reason[-half:]}"
 
 
 def _verdict_on(measurements: Sequence[Measurement]) -> tuple[Verdict, str]:

@@ -9,11 +9,11 @@ import pytest
 from protocol.conformance.case import Case, all_cases
 from protocol.conformance.fixture import pty_stand_in
 from protocol.conformance.host_watch import watch_in
-from protocol.conformance.ports import is_simulated, open_port
+from protocol.conformance.ports import SessionError, is_simulated, open_port
 from protocol.conformance.profile import ProfileError, load_profile
 from protocol.conformance.pytest_plugin import PTY
 from protocol.conformance.stand import StandError, stand_beside
-from protocol.conformance.suite import Session, SessionError, session_at
+from protocol.conformance.suite import Session, session_at
 from protocol.conformance.verdict import Verdict
 from protocol.conformance.wire import RecordedPort
 

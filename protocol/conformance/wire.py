@@ -8,6 +8,9 @@ from protocol.port import Port
 
 CR = b"\r"
 
+_LONGEST_LINE = 256
+"""What comes without a CR is a line that goes on up to here, and no line beyond."""
+
 
 class ReopenablePort(Port, Protocol):
     """A port of pyserial's, which can be opened again."""
@@ -92,25 +95,32 @@ class Line(NamedTuple):
 
 
 class Wire:
-    """Sends bytes, and gathers lines with the times of their bytes."""
+    """Sends bytes, and gathers lines with the times of their bytes.
 
-    def __init__(self, port: RecordedPort) -> None:
+    Bytes take `byte_s` each on their way to the table; what is waited for is waited for from the last of them on.
+    """
+
+    def __init__(self, port: RecordedPort, byte_s: float = 0.0) -> None:
         self.port = port
         self.clock = port.clock
+        self._byte_s = byte_s
+        self._sent_s = self.clock.now_s()
         self._rest = bytearray()
         self._times: list[float] = []
 
     def send(self, data: bytes) -> float:
         """Send bytes and return the time before the first of them."""
         now_s = self.clock.now_s()
+        self._sent_s = max(self._sent_s, now_s) + len(data) * self._byte_s
         self.port.write(data)
         return now_s
 
     def read_line(self, timeout_s: float) -> Line | None:
         """Return the next line, or None when none is complete in time."""
-        deadline_s = self.clock.now_s() + timeout_s
+        deadline_s = self._from_now_s(timeout_s)
         while (end := self._rest.find(CR)) < 0:
-            if not self._receive(deadline_s - self.clock.now_s()):
+            left_s = deadline_s - self.clock.now_s()
+            if (left_s < 0.0 and len(self._rest) > _LONGEST_LINE) or not self._receive(left_s):
                 return None
         text, times = bytes(self._rest[:end]), self._times[: end + 1]
         del self._rest[: end + 1], self._times[: end + 1]
@@ -119,10 +129,18 @@ class Wire:
 
     def listen(self, duration_s: float) -> bytes:
         """Return, and forget, all that has come and comes in this time."""
-        deadline_s = self.clock.now_s() + duration_s
+        deadline_s = self._from_now_s(duration_s)
         while (left_s := deadline_s - self.clock.now_s()) > 0.0:
             self._receive(left_s)
         return self.forget()
+
+    def drain(self, quiet_s: float, patience_s: float) -> bytes:
+        """Return, and forget, all that comes until nothing has come for a while, or patience ends."""
+        deadline_s = self._from_now_s(patience_s)
+        heard = b""
+        while (more := self.listen(quiet_s)) and self.clock.now_s() < deadline_s:
+            heard += more
+        return heard + more
 
     def forget(self) -> bytes:
         """Return, and forget, what has been received and not been read as a line."""
@@ -137,6 +155,10 @@ class Wire:
         self.port.close()
         self.forget()
         self.port.open()
+
+    def _from_now_s(self, duration_s: float) -> float:
+        """Return when a time is over that begins when all that was sent has arrived."""
+        return max(self._sent_s, self.clock.now_s()) + duration_s
 
     def _receive(self, timeout_s: float) -> bool:
         """Wait for a byte, or look whether one is there when time is up; return False when none came.

@@ -13,6 +13,9 @@ from protocol.messages import ErrorCode
 QUIET_S = 0.05
 """What must stay silent is listened to for this long, and the latency."""
 
+_PATIENCE_S = 60.0
+"""Five times the buffer are answered within it at 300 baud."""
+
 _STAND_STILL_S = 0.15
 """At 10 deg/s2 a table makes 0.11 deg in it."""
 
@@ -71,6 +74,10 @@ class WireChecks:
         """Require that nothing comes."""
         heard = self.wire.listen(QUIET_S + self.profile.serial.latency_s)
         require(not heard, f"{why} got {heard!r}, not silence")
+
+    def drain(self) -> bytes:
+        """Return all that comes until the line has fallen silent."""
+        return self.wire.drain(QUIET_S + self.profile.serial.latency_s, _PATIENCE_S)
 
     def read(self, letter: bytes = b"H") -> Decimal:
         """Read a register in exactly the form that clause 5.2 gives it."""

@@ -37,7 +37,14 @@ def test_a_profile_survives_its_record() -> None:
             "[tolerance]\ntracking_deg = 0.01\n",
             r"tolerance.tracking_deg is 0.01; it must be more than tolerance.rest_deg",
         ),
-        ("[serial]\ntimeout_s = 0.001\n", r"serial.timeout_s is 0.001; it must be more than serial.latency_s, 0.01"),
+        (
+            "[serial]\ntimeout_s = 0.04\n",
+            r"serial.timeout_s is 0.04; it must be more than serial.latency_s, 0.01, and the time of 32 bytes, 0.033",
+        ),
+        (
+            "[table]\ncounts_per_deg = 1e7\n",
+            r"motion.reach_deg is 400; with table.counts_per_deg 1e\+07 the counter ends at 214.748",
+        ),
         ("[serial]\ndecimals = 9\n", r"serial.decimals is 9; it must be 1 to 6"),
         ("[serial]\ndecimals = 1.5\n", r"serial.decimals is 1.5; it must be a whole number from 0 up"),
         ("[serial]\nbaud = -1\n", r"serial.baud is -1; it must be a whole number"),
@@ -46,6 +53,7 @@ def test_a_profile_survives_its_record() -> None:
         ("[rig]\ntrigger_command = 'beep'\n", r"rig.trigger_command is 'beep'; it must be a list of words"),
         ("[waive]\n'4.1/1' = 'no'\n", r"waive names 4.1/1, which is a must"),
         ("[waive]\n'9.9/9' = 'no'\n", r"waive names 9.9/9, which is no clause"),
+        ("[waive]\n'5.2/4' = ' '\n", r"waive.5.2/4 is empty; it must say why"),
         ("[waive]\n'5.2/4' = 3\n", r"waive.5.2/4 is 3; it must be a text"),
         ("[serial]\nparity = 1\n", r"serial.parity is not a key; allowed are baud, decimals"),
         ("[nonsense]\na = 1\n", r"\[nonsense\] is no section; there are table, serial"),

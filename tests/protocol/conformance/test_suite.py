@@ -12,11 +12,12 @@ from emulator.config import load_config
 from emulator.faults import fault_from
 from emulator.protocol_emulator import Serial
 from protocol.conformance.case import all_cases, chosen_cases
+from protocol.conformance.ports import SessionError
 from protocol.conformance.profile import Profile, load_profile
 from protocol.conformance.random_walk import walk
 from protocol.conformance.rig import Rig
 from protocol.conformance.stand import InProcess, WireOnly, stand_beside
-from protocol.conformance.suite import Outcome, Session, SessionError
+from protocol.conformance.suite import Outcome, Session
 from protocol.conformance.verdict import NonconformityError, Verdict
 from protocol.conformance.wire import RecordedPort, ReopenablePort, Wire
 from tests.protocol.conformance.mutants import MUTANTS, Mutant, port_to

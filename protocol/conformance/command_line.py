@@ -1,0 +1,96 @@
+"""What the kit's command line says and asks, and how it is told to end."""
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+from typing import TextIO
+
+from protocol.conformance.ports import is_simulated
+from protocol.conformance.profile import Profile
+from protocol.conformance.wire import ReopenablePort
+
+_ENDING = ("SIGTERM", "SIGHUP")
+
+
+class UsageError(Exception):
+    """The command line cannot be carried out; the message says why."""
+
+
+class Told(KeyboardInterrupt):  # noqa: N818 - like Ctrl-C, it is nothing that went wrong
+    """A signal told the program to end, which it does as after Ctrl-C."""
+
+
+@contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP break into a `with` block as Ctrl-C does: a table in motion must be stopped."""
+    before = {}
+    for name in _ENDING:
+        number = getattr(signal, name, None)  # not every system has them
+        if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # nohup has SIGHUP ignored
+            before[number] = signal.signal(number, _end)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def status_after(interrupt: KeyboardInterrupt) -> int:
+    """Return the exit status of a program that a signal has ended."""
+    return 128 + int(interrupt.args[0] if isinstance(interrupt, Told) else signal.SIGINT)
+
+
+def say(sentence: str) -> None:
+    """Tell the person at the terminal, if there is one."""
+    with suppress(OSError):
+        print(f"conformance: {sentence}", file=sys.stderr, flush=True)
+
+
+def tell(text: str) -> None:
+    """Print a result. When nobody reads results any more the work goes on: its files hold them all."""
+    try:
+        print(text, flush=True)
+    except OSError as error:
+        if not isinstance(error, BrokenPipeError):  # as `| head` ends it
+            say(f"stdout: {error.strerror}; no more is printed")
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+
+
+def show_progress(text: str) -> None:
+    """Show how far the work is, in place of what was shown before; on a terminal that can do so only."""
+    if is_terminal(sys.stderr) and os.environ.get("TERM") != "dumb":
+        with suppress(OSError):
+            sys.stderr.write(f"\r\x1b[K{text}\r" if text else "\r\x1b[K")
+            sys.stderr.flush()
+
+
+def is_terminal(stream: TextIO | None) -> bool:
+    """Return whether a person is at a stream; one that was closed before the start is None."""
+    return stream is not None and stream.isatty()
+
+
+def confirm(url: str, may_move: bool, profile: Profile, port: ReopenablePort) -> None:
+    """Let nothing real move before somebody has agreed to how far and how fast.
+
+    Raises:
+        UsageError: nobody has.
+    """
+    if may_move or is_simulated(port):
+        return
+    limits = f"the table at {url} will turn {profile.motion}"
+    if not is_terminal(sys.stdin):
+        raise UsageError(f"{limits}; say --yes if it may")
+    say(f"{limits}.")
+    sys.stderr.write("Is its way free? Type yes to begin: ")
+    sys.stderr.flush()
+    if sys.stdin.readline().strip().lower() != "yes":
+        raise UsageError("nothing was moved")
+
+
+def _end(number: int, _: FrameType | None) -> None:
+    raise Told(number)

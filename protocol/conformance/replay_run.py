@@ -1,0 +1,74 @@
+"""A replay from the command line: a recorded wire sent to another table, and where the answers part on stdout."""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from protocol.conformance.case import Case
+from protocol.conformance.command_line import UsageError, confirm, say, tell
+from protocol.conformance.ports import SessionError
+from protocol.conformance.profile import Profile
+from protocol.conformance.record import Record, read_record
+from protocol.conformance.replay import replay
+from protocol.conformance.stand import Stand, stand_beside
+from protocol.conformance.suite import Session, session_at
+from protocol.conformance.suite_run import how_it_was_left
+from protocol.conformance.wire import RecordedPort, ReopenablePort, Wire
+
+
+def run_replay(options: argparse.Namespace, profile: Profile, port: ReopenablePort, cases: Sequence[Case]) -> int:
+    """Send what the record has of some cases to the table at a port; return 1 where an answer is another, else 0.
+
+    Raises:
+        RecordError: the file is no record.
+        UsageError: it holds none of these cases, or it may not be sent to this table.
+        SessionError: what is at the port cannot be tested, or stands elsewhere than where the record began.
+        StandError: what is beside it does not work.
+    """
+    record = _wanted(read_record(options.replay), cases, options.replay)
+    _check_reach(record.profile, profile, options.replay)
+    stand = stand_beside(port, options.control, profile)
+    confirm(options.port, options.yes, profile, port)
+    recorded_port = RecordedPort(port)
+    session = session_at(options.port, recorded_port, profile, stand)
+    if session.home_deg != record.home_deg:
+        raise SessionError(
+            f"the table stands at {session.home_deg} deg, the record began at {record.home_deg}; bring it there first"
+        )
+    try:
+        parted = _send(record, Wire(recorded_port), stand, profile)
+        session.end()
+    except BaseException:
+        session.stop()
+        say(how_it_was_left(session))
+        raise
+    tell(f"{parted} of {len(record.cases)} cases part")
+    return int(parted > 0)
+
+
+def _send(record: Record, wire: Wire, stand: Stand, profile: Profile) -> int:
+    """Replay each case, and return how many part."""
+    parted = 0
+    for case in record.cases:
+        parting = replay(case, wire, stand, profile)
+        parted += parting is not None
+        tell(f"{'parts' if parting else 'same':9} {case.id}{f': {parting}' if parting else ''}")
+    return parted
+
+
+def _wanted(record: Record, cases: Sequence[Case], path: Path) -> Record:
+    """Return the record with the wanted cases alone, those that were skipped when it was made left out."""
+    names = {case.id for case in cases}
+    kept = tuple(case for case in record.cases if case.id in names and case.wire)
+    if not kept:
+        raise UsageError(f"{path}: holds no wire of these cases; nothing can be sent")
+    return replace(record, cases=kept)
+
+
+def _check_reach(recorded: Profile, allowed: Profile, path: Path) -> None:
+    """Refuse a record that moves a table farther or faster than this one may be moved."""
+    for key in ("reach_deg", "speed_deg_s", "acceleration_deg_s2"):
+        wanted, most = getattr(recorded.motion, key), getattr(allowed.motion, key)
+        if wanted > most:
+            raise UsageError(f"{path}: was recorded with motion.{key} {wanted:g}; the profile allows {most:g}")

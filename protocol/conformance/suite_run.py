@@ -1,0 +1,122 @@
+"""A run of the suite from the command line: the verdicts on stdout, and the files that it leaves."""
+
+import argparse
+import os
+import shlex
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from pathlib import Path
+
+from protocol.conformance.case import Case, only
+from protocol.conformance.command_line import UsageError, confirm, say, show_progress, status_after, tell
+from protocol.conformance.host_watch import watch_in
+from protocol.conformance.ports import described, is_simulated
+from protocol.conformance.profile import Profile
+from protocol.conformance.record import Header, count_verdicts, write_junit, write_record
+from protocol.conformance.report import write_report
+from protocol.conformance.stand import stand_beside
+from protocol.conformance.suite import Outcome, Session, session_at
+from protocol.conformance.verdict import Verdict
+from protocol.conformance.wire import RecordedPort, ReopenablePort
+
+_BAD = {Verdict.FAIL, Verdict.ERROR}
+_NO_FILES = 2
+
+
+def run_suite(options: argparse.Namespace, profile: Profile, port: ReopenablePort, cases: Sequence[Case]) -> int:
+    """Run cases on the table at a port, leave record, report and JUnit's XML, and return the exit status.
+
+    Raises:
+        UsageError: the files cannot be put where they should go, or nobody agreed to the table's being moved.
+        SessionError: what is at the port cannot be tested.
+        StandError: what is beside it does not work.
+    """
+    junit = _junit_file(options)
+    confirm(options.port, options.yes, profile, port)
+    begun = None if is_simulated(port) else datetime.now().astimezone().isoformat(timespec="seconds")
+    outcomes: list[Outcome] = []
+    status = 0
+    with watch_in(simulated=is_simulated(port)) as watch:
+        stand = stand_beside(port, options.control, profile)
+        session = session_at(options.port, RecordedPort(port), profile, stand, options.seed, watch)
+        header = Header(
+            described(options.port), profile, options.seed, session.home_deg, sorted(session.capabilities), begun
+        )
+        try:
+            session.run(cases, _progress(outcomes, len(cases), options))
+        except KeyboardInterrupt as interrupt:
+            status = status_after(interrupt)
+            say(f"interrupted after {len(outcomes)} of {len(cases)} cases; {how_it_was_left(session)}")
+    tell(", ".join(f"{count} {verdict}" for verdict, count in count_verdicts(outcomes).items()) or "nothing was run")
+    written = _write(options, header, outcomes, junit)
+    return status or (int(any(outcome.verdict in _BAD for outcome in outcomes)) if written else _NO_FILES)
+
+
+def how_it_was_left(session: Session) -> str:
+    """Return what became of a table whose session was broken off."""
+    return "the table was stopped" if session.is_stopped else "the table does not answer: see to it that it has stopped"
+
+
+def _junit_file(options: argparse.Namespace) -> Path:
+    """Return where JUnit's XML goes, when all files can be written."""
+    junit: Path = options.junit or options.out / "junit.xml"
+    if junit.is_dir():
+        raise UsageError(f"--junit {junit}: is a directory; name a file")
+    if junit in {options.out / "record.json", options.out / "report.html"}:
+        raise UsageError(f"--junit {junit}: goes to another file of --out; name another")
+    for directory in (options.out, junit.parent):
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UsageError(f"{directory}: is no directory and cannot become one: {error.strerror}") from error
+        if not os.access(directory, os.W_OK | os.X_OK):
+            raise UsageError(f"{directory}: cannot be written to; name another directory, or change its rights")
+    return junit
+
+
+def _write(options: argparse.Namespace, header: Header, outcomes: Sequence[Outcome], junit: Path) -> bool:
+    """Write the files, and return whether all could be; one that cannot takes none of the others with it."""
+    report = options.out / "report.html"
+    written = True
+    for write in (
+        lambda: write_record(options.out / "record.json", header, outcomes),
+        lambda: write_junit(junit, header, outcomes),
+        lambda: write_report(report, header, outcomes, lambda case: _repeat(options, case)),
+    ):
+        try:
+            write()
+        except OSError as error:
+            say(str(error))
+            written = False
+    if written:
+        say(f"the report is {report}")
+    return written
+
+
+def _progress(outcomes: list[Outcome], total: int, options: argparse.Namespace) -> Callable[[Outcome], None]:
+    """Return what takes in each outcome: it prints those worth reading, and on a terminal shows how far the run is."""
+
+    def take(outcome: Outcome) -> None:
+        outcomes.append(outcome)
+        show_progress("")
+        for run in outcome.spoiled:
+            say(f"{outcome.case.id} was run again, since {run}")
+        if outcome.verdict is not Verdict.PASS:
+            tell(f"{outcome.verdict:9} {outcome.case.id}: {outcome.reason}")
+        if outcome.verdict in _BAD:
+            tell(f"          {outcome.case.clause.level}: {outcome.case.clause.text}")
+            tell(f"          again: {_repeat(options, outcome.case)}")
+        if len(outcomes) < total:
+            show_progress(f"{len(outcomes)}/{total} {outcome.case.id}")
+
+    return take
+
+
+def _repeat(options: argparse.Namespace, case: Case) -> str:
+    """Return the command that repeats one case alone."""
+    words = ["python", "-m", "protocol.conformance", "--port", options.port]
+    for name in ("profile", "control"):
+        if getattr(options, name) is not None:
+            words += [f"--{name}", str(getattr(options, name))]
+    words += ["--case", only(case), "--seed", str(options.seed), "--out", str(options.out / "again")]
+    return shlex.join(words + ["--yes"] * options.yes)
