@@ -4,6 +4,7 @@ from protocol.conformance.case import case
 from protocol.conformance.rig import Rig
 from protocol.conformance.stand import DISCONNECT, ERROR_REPLIES
 from protocol.conformance.verdict import require
+from protocol.conformance.wire_checks import number
 from protocol.messages import LINE_LIMIT, ErrorCode
 
 
@@ -39,7 +40,7 @@ def an_empty_line_has_no_reply(rig: Rig) -> None:
 @case("3.1/4")
 def bytes_may_come_slowly(rig: Rig) -> None:
     """Send a command byte by byte with pauses, and two commands with the cut in mid-line."""
-    line = b"S %d\r" % max(1, int(rig.profile.motion.speed_deg_s))
+    line = b"S %s\r" % number(rig.profile.motion.speed_deg_s)
     for index in range(len(line)):
         rig.wire.send(line[index : index + 1])
         rig.wire.clock.sleep_s(0.02)

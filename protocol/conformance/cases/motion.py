@@ -10,13 +10,15 @@ from protocol.conformance.verdict import NonconformityError, require
 
 _RAMP_DEG = 5.0
 """From readings of a tenth of a degree, an acceleration can be told over such a way."""
+_RAMP_READINGS = 18
+"""And from so many of them."""
 
 
 @case("7.1/1", travel_deg=30)
 def a_long_motion_is_a_trapezoid(rig: Rig) -> None:
     """Measure top speed, acceleration and deceleration of a motion long enough to reach S."""
     allowed = rig.profile.motion
-    _travel(rig, 30, *_readable(30, allowed.speed_deg_s / 2, allowed.acceleration_deg_s2 / 4))
+    _travel(rig, 30, *_readable(rig, 30, allowed.speed_deg_s / 2, allowed.acceleration_deg_s2 / 4))
     _measure_trapezoid(rig)
 
 
@@ -24,7 +26,7 @@ def a_long_motion_is_a_trapezoid(rig: Rig) -> None:
 def a_long_motion_backwards_is_a_trapezoid(rig: Rig) -> None:
     """The same backwards, with other S and A."""
     allowed = rig.profile.motion
-    _travel(rig, -30, *_readable(30, allowed.speed_deg_s, allowed.acceleration_deg_s2))
+    _travel(rig, -30, *_readable(rig, 30, allowed.speed_deg_s, allowed.acceleration_deg_s2))
     _measure_trapezoid(rig)
 
 
@@ -38,14 +40,16 @@ def a_short_motion_is_a_triangle(rig: Rig) -> None:
 @case("7.1/3", travel_deg=30)
 def a_motion_takes_its_time(rig: Rig) -> None:
     """Compare the pace of a long motion with the trapezoid's."""
-    _travel(rig, 30, rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
+    allowed = rig.profile.motion
+    _travel(rig, 30, *_unhurried(rig, 30, allowed.speed_deg_s / 2, allowed.acceleration_deg_s2 / 2))
     _measure_duration(rig)
 
 
 @case("7.1/3:triangle", travel_deg=10)
 def a_short_motion_takes_its_time(rig: Rig) -> None:
     """The same for a motion too short to reach S."""
-    _travel(rig, 10, rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2 / 5)
+    allowed = rig.profile.motion
+    _travel(rig, 10, *_unhurried(rig, 10, allowed.speed_deg_s, allowed.acceleration_deg_s2 / 5))
     _measure_duration(rig)
 
 
@@ -74,7 +78,7 @@ def the_speed_stays_within_s(rig: Rig) -> None:
         for later in rig.motion.samples[index + 1 :]
         if window_s <= later.time_s - one.time_s <= 2 * window_s
     ]
-    jitter = (rig.profile.resolution_deg + top * rig.profile.serial.latency_s / 2) / window_s
+    jitter = (rig.profile.step_deg + top * rig.profile.serial.latency_s / 2) / window_s
     excess = max(speeds, default=0.0) - top
     rig.measure("highest speed, above S", excess, "deg/s", most=top * rig.profile.tolerance.speed_share + jitter)
 
@@ -133,10 +137,17 @@ def _travel(rig: Rig, distance_deg: float, top_deg_s: float, rate_deg_s2: float)
     rig.finish()
 
 
-def _readable(distance_deg: float, top_deg_s: float, rate_deg_s2: float) -> tuple[float, float]:
+def _readable(rig: Rig, distance_deg: float, top_deg_s: float, rate_deg_s2: float) -> tuple[float, float]:
     """Return S and A, lowered until both ramps are long enough to be read and leave a third of the way between them."""
     rate_deg_s2 = min(rate_deg_s2, top_deg_s**2 / (2 * _RAMP_DEG))
+    top_deg_s, rate_deg_s2 = _unhurried(rig, distance_deg, top_deg_s, rate_deg_s2)
     return min(top_deg_s, cruising_speed(distance_deg, rate_deg_s2)), rate_deg_s2
+
+
+def _unhurried(rig: Rig, distance_deg: float, top_deg_s: float, rate_deg_s2: float) -> tuple[float, float]:
+    """Return S and A, this lowered until each ramp of a motion takes the time of so many readings."""
+    ramp_s = _RAMP_READINGS * rig.reading_s
+    return top_deg_s, min(rate_deg_s2, top_deg_s / ramp_s, 2 * distance_deg / (3 * ramp_s**2))
 
 
 def _measure_trapezoid(rig: Rig) -> None:
@@ -145,7 +156,9 @@ def _measure_trapezoid(rig: Rig) -> None:
     up, cruise, down = motion.phases
     top, rate = rig.top_deg_s, rig.rate_deg_s2
     speed_share = rig.profile.tolerance.speed_share
-    top_measured = abs(_slope(_within(rig, up.duration_s + 0.1, up.duration_s + cruise.duration_s - 0.05)))
+    settled_s = up.duration_s + min(0.1, cruise.duration_s / 3)
+    slowing_s = up.duration_s + cruise.duration_s - min(0.05, cruise.duration_s / 6)
+    top_measured = abs(_slope(_within(rig, settled_s, slowing_s)))
     rig.measure("top speed", top_measured, "deg/s", top * (1 - speed_share), top * (1 + speed_share))
     share = rig.profile.tolerance.acceleration_share
     for name, origin_deg, begin_s, end_s in (

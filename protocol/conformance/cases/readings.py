@@ -17,21 +17,23 @@ def h_reads_the_position(rig: Rig) -> None:
 def a_position_is_of_the_time_of_its_reply(rig: Rig) -> None:
     """At constant speed read again and again: each step of the position is as long as the time between its readings."""
     allowed = rig.profile.motion
-    speed = min(allowed.speed_deg_s / 2, cruising_speed(40, allowed.acceleration_deg_s2))
+    speed = min(allowed.speed_deg_s / 2, 40 / (20 * rig.reading_s), cruising_speed(40, allowed.acceleration_deg_s2))
     rig.settings(speed, allowed.acceleration_deg_s2)
     rig.move_to(40)
     begin_s = speed / rig.rate_deg_s2 + 0.1
     rig.follow(begin_s)
-    rig.follow(rig.motion.expectations[-1].motion.duration_s - 2 * begin_s)
+    began_s, duration_s = rig.motion.expectations[-1].began_s, rig.motion.expectations[-1].motion.duration_s
+    rig.follow(duration_s - 2 * begin_s)
     # A register that is read only now and then gives the same position twice, then a jump.
     steps = zip(rig.motion.samples, rig.motion.samples[1:], strict=False)
-    cruising = [(one, two) for one, two in steps if begin_s < one.time_s - rig.motion.expectations[-1].began_s]
+    slowing_s = duration_s - speed / rig.rate_deg_s2
+    cruising = [(one, two) for one, two in steps if begin_s < one.time_s - began_s and two.time_s - began_s < slowing_s]
     worst_deg = max(
         abs(two.position_deg - one.position_deg - speed * (two.time_s - one.time_s))
         - speed * (one.uncertainty_s + two.uncertainty_s)
         for one, two in cruising
     )
-    allowed_deg = rig.profile.resolution_deg + 0.1 * speed * 0.1
+    allowed_deg = rig.profile.step_deg + 0.1 * speed * 0.1
     rig.measure("step of the position, beyond its time", max(worst_deg, 0.0), "deg", most=allowed_deg)
     rig.finish()
 

@@ -49,12 +49,12 @@ def a_client_finds_its_place_after_noise(rig: Rig) -> None:
 @case("8.3/4", travel_deg=20)
 def a_stop_is_heard_at_once(rig: Rig) -> None:
     """During a motion leave replies unread and send CAN, CR and `R 0`: the table stops, and comes back."""
-    rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
+    rig.settings(min(rig.profile.motion.speed_deg_s / 2, 4), rig.profile.motion.acceleration_deg_s2 / 2)
     rig.move_to(20)
     rig.follow(0.5)
     rig.wire.send(b"H\rH\rH")
     rig.wire.send(b"\x18\rR 0\r")
-    rig.wire.listen(0.1)
+    rig.drain()
     stopped = float(rig.wait_for_rest()) - rig.home_deg
     rig.measure("where R 0 brought it to rest", stopped, "deg", most=15)
 

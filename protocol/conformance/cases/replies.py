@@ -6,17 +6,17 @@ from protocol.conformance.case import case
 from protocol.conformance.rig import Rig
 from protocol.conformance.stand import ERROR_REPLIES, PRESET, STRICT
 from protocol.conformance.verdict import InapplicableError, NonconformityError, require
+from protocol.conformance.wire_checks import number
 from protocol.messages import ErrorCode
 
-_MIXED = (b"H", b"L", b"S 10", b"A 20", b"H", b"R 0", b"L", b"H", b"S 0", b"?")
-"""Lines of which each has a reply of its own kind: 38 bytes with their CR."""
 _KINDS = (b"H ", b"L ", b"OK", b"OK", b"H ", b"OK", b"L ", b"H ", b"ERR 3 ", b"ERR 1 ")
+"""How the replies to the ten lines of `_mixed` begin."""
 
 
 @case("5.1/1", ERROR_REPLIES)
 def each_line_has_one_reply(rig: Rig) -> None:
     """Send ten lines of every kind one by one; each has one reply, and nothing follows it."""
-    for line in _MIXED:
+    for line in _mixed(rig):
         rig.ask(line)
     rig.silence("after ten replies the line")
 
@@ -24,9 +24,10 @@ def each_line_has_one_reply(rig: Rig) -> None:
 @case("5.1/2", ERROR_REPLIES)
 def replies_come_in_order(rig: Rig) -> None:
     """Send ten lines of every kind at once, three times; the replies are of the right kinds in the right order."""
+    lines = _mixed(rig)
     for _ in range(3):
-        rig.wire.send(b"\r".join(_MIXED) + b"\r")
-        for line, kind in zip(_MIXED, _KINDS, strict=True):
+        rig.wire.send(b"\r".join(lines) + b"\r")
+        for line, kind in zip(lines, _KINDS, strict=True):
             got = rig.reply_to(line).text
             require(got.startswith(kind), f"of ten lines sent at once, {line!r} got {got!r}, not {kind.decode()}...")
 
@@ -61,7 +62,8 @@ def nothing_else_is_sent(rig: Rig) -> None:
 @case("5.1/4")
 def a_reply_ends_in_cr_alone(rig: Rig) -> None:
     """Look for LF, and for a space before the CR."""
-    for line in (b"H", b"L", b"S 10", b"?" if rig.profile.serial.error_replies else b"A 20"):
+    speed, rate = _settings(rig)
+    for line in (b"H", b"L", speed, b"?" if rig.profile.serial.error_replies else rate):
         got = rig.ask(line).text
         require(got == got.strip() and b"\n" not in got, f"{line!r} got {got!r}: white space around a reply")
 
@@ -107,7 +109,8 @@ def halves_go_to_the_even_digit(rig: Rig) -> None:
     # The fifth of these is 0.25 deg on the default table, which must read 0.2.
     halves = [(2 * k + 1) * unit / 2 * count_deg for k in range(200)]
     exact = [int(half) for half in halves if half == int(half)][:4]
-    require(bool(exact), "this counter has no count whose angle lies between two readings")
+    if not exact:
+        raise InapplicableError("this counter has no count whose angle lies between two readings")
     for count in exact:
         _expect_rounded(rig, count)
         _expect_rounded(rig, -count)
@@ -182,12 +185,24 @@ def a_strict_table_refuses_in_silence(rig: Rig) -> None:
 @case("5.4/2", STRICT)
 def a_strict_table_answers_all_else(rig: Rig) -> None:
     """Mix refused lines with others; the others are answered in order."""
-    rig.wire.send(b"H\r?\rS 10\rS 0\rL\rR x\rR 0\r")
-    for line, kind in ((b"H", b"H "), (b"S 10", b"OK"), (b"L", b"L "), (b"R 0", b"OK")):
+    speed, _ = _settings(rig)
+    rig.wire.send(b"H\r?\r%s\rS 0\rL\rR x\rR 0\r" % speed)
+    for line, kind in ((b"H", b"H "), (speed, b"OK"), (b"L", b"L "), (b"R 0", b"OK")):
         got = rig.reply_to(line).text
         if not got.startswith(kind):
             raise NonconformityError(f"{line!r} got {got!r}, not {kind.decode()}...")
     rig.silence("after the last of them the line")
+
+
+def _settings(rig: Rig) -> tuple[bytes, bytes]:
+    """Return lines that set S and A to what the profile allows."""
+    allowed = rig.profile.motion
+    return b"S " + number(allowed.speed_deg_s), b"A " + number(allowed.acceleration_deg_s2)
+
+
+def _mixed(rig: Rig) -> tuple[bytes, ...]:
+    """Return ten lines of which each has a reply of its own kind; with their CR they fit the least buffer."""
+    return (b"H", b"L", *_settings(rig), b"H", b"R 0", b"L", b"H", b"S 0", b"?")
 
 
 def _expect_words(rig: Rig, line: bytes, code: ErrorCode) -> None:

@@ -1,0 +1,83 @@
+"""Tables of another make: the kit passes what is right, however unusual it is, and says what it cannot test."""
+
+from pathlib import Path
+
+import pytest
+
+from protocol.conformance.case import all_cases
+from protocol.conformance.profile import load_profile
+from protocol.conformance.stand import Stand, WireOnly
+from protocol.conformance.suite import Outcome, Session
+from protocol.conformance.verdict import Verdict
+from protocol.conformance.wire import RecordedPort
+from tests.protocol.conformance.ideal_table import IdealPort, IdealTable, Make
+
+
+def outcomes_of(make: Make, folder: Path, more: str = "", stand: Stand | None = None) -> list[Outcome]:
+    file = folder / "table.toml"
+    file.write_text(f"{make.profile}\n{more}")
+    table = IdealTable(make)
+    session = Session(RecordedPort(IdealPort(table)), load_profile(file), stand or table)
+    return session.run(all_cases())
+
+
+MAKES = {
+    "silent when it refuses": Make(),
+    "acts with its reply": Make(acts_after=1.0),
+    "answers one line after the other": Make(is_busy_meanwhile=True, error_replies=True),
+    "half a second away": Make(latency_s=0.5),
+    "one decimal, ten counts to the degree": Make(decimals=1, counts_per_deg=10, acts_after=0.0),
+    "six decimals": Make(decimals=6, error_replies=True),
+    "300 baud": Make(baud=300, latency_s=0.01, error_replies=True),
+    "bytes take no time": Make(baud=0, latency_s=0.0, error_replies=True),
+    "an odd number of counts": Make(counts_per_deg=2731, latency_s=0.01),
+    "slow": Make(top_speed=1.0, top_acceleration=1.0, error_replies=True),
+    "fast": Make(top_speed=180.0, top_acceleration=400.0, latency_s=0.01, error_replies=True),
+    "fast and far away": Make(top_speed=360.0, top_acceleration=2000.0),
+}
+
+
+@pytest.mark.parametrize("name", MAKES)
+def test_a_right_table_of_another_make_passes(name: str, tmp_path: Path) -> None:
+    outcomes = outcomes_of(MAKES[name], tmp_path)
+    bad = [
+        (outcome.case.id, outcome.reason) for outcome in outcomes if outcome.verdict in {Verdict.FAIL, Verdict.ERROR}
+    ]
+    assert bad == []
+
+
+@pytest.mark.parametrize("motion", ["speed_deg_s = 0.5\nacceleration_deg_s2 = 0.5", "speed_deg_s = 1"])
+def test_a_coarse_encoder_on_a_slow_motion_is_not_taken_for_rest(motion: str, tmp_path: Path) -> None:
+    make = Make(latency_s=0.01)
+    file = f"{make.profile.partition('[motion]')[0]}\n[motion]\nreach_deg = 60\n{motion}\n"
+    if "acceleration" not in motion:
+        file += "acceleration_deg_s2 = 60\n"
+    (tmp_path / "table.toml").write_text(file)
+    table = IdealTable(make)
+    session = Session(RecordedPort(IdealPort(table)), load_profile(tmp_path / "table.toml"), table)
+    bad = [
+        (outcome.case.id, outcome.reason)
+        for outcome in session.run(all_cases())
+        if outcome.verdict in {Verdict.FAIL, Verdict.ERROR}
+    ]
+    assert bad == []
+
+
+def test_what_such_a_table_lacks_is_said(tmp_path: Path) -> None:
+    outcomes = outcomes_of(Make(), tmp_path, "[rig]\nsees_disconnect = false\n", WireOnly())
+    reasons = {outcome.reason for outcome in outcomes if outcome.verdict is Verdict.SKIPPED}
+    assert reasons == {
+        "lacks a trigger input that the rig can drive",
+        "lacks a way to switch the table off and on",
+        "lacks a way to preset the position counter",
+        "lacks a table that sees its client go",
+        "lacks error replies",
+    }
+
+
+def test_a_counter_without_halves_cannot_show_how_they_are_rounded(tmp_path: Path) -> None:
+    (outcome,) = [one for one in outcomes_of(Make(), tmp_path) if one.case.id == "5.2/4"]
+    assert (outcome.verdict, outcome.reason) == (
+        Verdict.SKIPPED,
+        "this counter has no count whose angle lies between two readings",
+    )
