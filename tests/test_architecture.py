@@ -40,7 +40,8 @@ EDGE_MODULES = {
 PROTOCOL_EDGE = {
     "protocol/client.py": {"serial"},
     "protocol/clock.py": {"time"},
-    "protocol/conformance/__main__.py": {"datetime", "pathlib"},
+    "protocol/conformance/__main__.py": {"pathlib"},
+    "protocol/conformance/command_line.py": {"os", "signal"},
     "protocol/conformance/fixture.py": {"os", "pathlib", "subprocess"},
     "protocol/conformance/host_watch.py": {"os", "select", "threading", "time"},
     "protocol/conformance/ports.py": {"pathlib", "serial"},
@@ -48,8 +49,10 @@ PROTOCOL_EDGE = {
     "protocol/conformance/program.py": {"os", "signal", "subprocess"},
     "protocol/conformance/pytest_plugin.py": {"pathlib"},
     "protocol/conformance/record.py": {"pathlib"},
+    "protocol/conformance/replay_run.py": {"pathlib"},
     "protocol/conformance/report.py": {"pathlib"},
     "protocol/conformance/stand.py": {"pathlib", "socket"},
+    "protocol/conformance/suite_run.py": {"datetime", "os", "pathlib"},
 }
 
 EMULATOR_EDGE = {

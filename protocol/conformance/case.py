@@ -68,6 +68,8 @@ def chosen_cases(prefixes: Sequence[str]) -> list[Case]:
     """
     everything = all_cases()
     for prefix in prefixes:
+        if not prefix:
+            raise ValueError("a prefix is empty; leave the option out for all cases")
         if not any(_begins(one.id, prefix) for one in everything):
             raise ValueError(f"no case begins with {prefix}; --list shows all")
     return [one for one in everything if not prefixes or any(_begins(one.id, prefix) for prefix in prefixes)]

@@ -19,7 +19,7 @@ class UsageError(Exception):
     """The command line cannot be carried out; the message says why."""
 
 
-class Told(KeyboardInterrupt):  # noqa: N818 - like Ctrl-C, it is nothing that went wrong
+class Told(KeyboardInterrupt):
     """A signal told the program to end, which it does as after Ctrl-C."""
 
 
@@ -45,14 +45,19 @@ def status_after(interrupt: KeyboardInterrupt) -> int:
 
 def say(sentence: str) -> None:
     """Tell the person at the terminal, if there is one."""
-    with suppress(OSError):
-        print(f"conformance: {sentence}", file=sys.stderr, flush=True)
+    if sys.stderr is not None:
+        with suppress(OSError):
+            sys.stderr.write(f"conformance: {sentence}\n")
+            sys.stderr.flush()
 
 
 def tell(text: str) -> None:
     """Print a result. When nobody reads results any more the work goes on: its files hold them all."""
+    if sys.stdout is None:
+        return
     try:
-        print(text, flush=True)
+        sys.stdout.write(f"{text}\n")
+        sys.stdout.flush()
     except OSError as error:
         if not isinstance(error, BrokenPipeError):  # as `| head` ends it
             say(f"stdout: {error.strerror}; no more is printed")

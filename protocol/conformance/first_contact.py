@@ -15,7 +15,10 @@ SETTLE_S = 0.3
 """Beyond the latency, a line on which nothing has come for so long is empty."""
 
 PATIENCE_S = 30.0
-"""How long a busy machine is given to calm down, and a table that talks to fall silent."""
+"""How long a busy machine is given to calm down, and a table that is stopped to fall silent."""
+
+_TALK_S = 10.0
+"""How long a table may go on with its replies to whoever was there before."""
 
 _POSITION = re.compile(rb"(?:^|[\r\n])H (-?[0-9]+\.[0-9]+) *\r")
 
@@ -39,7 +42,7 @@ def resting_position(wire: Wire, profile: Profile, watch: Watch) -> Decimal:
 def _asked(wire: Wire, profile: Profile) -> Decimal:
     wire.send(CANCEL)
     quiet_s = SETTLE_S + profile.serial.latency_s
-    if wire.drain(quiet_s, PATIENCE_S) and (chatter := wire.listen(quiet_s)):
+    if wire.drain(quiet_s, _TALK_S) and (chatter := wire.listen(quiet_s)):
         raise SessionError(f"talks without being asked: {chatter[:40]!r}...; this is no table of this protocol")
     before, after = _reading(wire, profile), _reading(wire, profile)
     if before != after:

@@ -14,7 +14,7 @@ class SessionError(Exception):
 
 
 def open_port(url: str, profile: Profile) -> ReopenablePort:
-    """Open a device or any URL of pyserial's, at the profile's rate.
+    """Open a device or any URL of pyserial's, at the profile's rate, with a lock that keeps out others of this kit.
 
     Raises:
         SessionError: it cannot be opened.
@@ -26,7 +26,7 @@ def open_port(url: str, profile: Profile) -> ReopenablePort:
     timeout_s = profile.serial.timeout_s
     try:
         return serial.serial_for_url(
-            url, baudrate=profile.serial.baud or 9600, timeout=timeout_s, write_timeout=timeout_s
+            url, baudrate=profile.serial.baud or 9600, timeout=timeout_s, write_timeout=timeout_s, exclusive=True
         )
     except (OSError, ValueError) as error:
         raise SessionError(f"cannot open {url}: {error}; check the name, the rights and the table") from error

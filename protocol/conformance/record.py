@@ -1,12 +1,15 @@
 """The record of a session: one JSON file that says all, and JUnit's XML for machines that count tests."""
 
 import json
+import math
 import platform
+import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from xml.etree import ElementTree as ET
 
 from protocol.conformance.profile import Profile, ProfileError, profile_from
@@ -17,6 +20,9 @@ from protocol.conformance.wire import Event
 
 FORMAT = "seventh-axis conformance record"
 VERSION = 1
+
+_WAYS: tuple[Literal["sent", "received", "beside"], ...] = ("sent", "received", "beside")
+_DEED = re.compile(rb"reopen|trigger|power_cycle|preset -?[0-9]{1,10}")
 
 
 class RecordError(ValueError):
@@ -101,13 +107,10 @@ def read_record(path: Path) -> Record:
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         raise RecordError(f"{path}: is no {FORMAT}")
     if record.get("version") != VERSION:
-        raise RecordError(f"{path}: is of version {record.get('version')}; this program reads version {VERSION}")
+        raise RecordError(f"{path}: is of version {record.get('version')!r}; this program reads version {VERSION}")
     try:
         cases = tuple(
-            RecordedCase(
-                case["id"], tuple(Event(time_s, way, data.encode("latin-1")) for time_s, way, data in case["wire"])
-            )
-            for case in record["cases"]
+            RecordedCase(case["id"], tuple(_event(*event) for event in case["wire"])) for case in record["cases"]
         )
         return Record(profile_from(record["profile"], str(path)), int(record["home_deg"]), cases)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -146,10 +149,32 @@ def write_junit(path: Path, header: Header, outcomes: Sequence[Outcome]) -> None
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a file under a temporary name and give it its own when it is whole."""
+    """Write a file under a temporary name and give it its own when it is whole.
+
+    Raises:
+        OSError: it cannot be written; nothing is left of it.
+    """
     partial = path.with_name(path.name + ".part")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(path)
+    try:
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            partial.unlink()
+        raise OSError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def _event(time_s: object, way: object, data: str) -> Event:
+    """Return an event as it was recorded, or raise ValueError: a table is to be moved by it."""
+    if not isinstance(time_s, int | float) or not math.isfinite(time_s):
+        raise ValueError(f"{time_s!r} is no time")
+    known = next((one for one in _WAYS if one == way), None)
+    if known is None:
+        raise ValueError(f"{way!r} is none of {', '.join(_WAYS)}")
+    event = Event(time_s, known, data.encode("latin-1"))
+    if known == "beside" and not _DEED.fullmatch(event.data):
+        raise ValueError(f"{data!r} is nothing that is done beside the wire")
+    return event
 
 
 def _case(outcome: Outcome) -> dict[str, Any]:

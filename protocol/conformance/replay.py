@@ -24,7 +24,7 @@ class Parting(NamedTuple):
     now: bytes | None
 
     def __str__(self) -> str:
-        recorded, now = (repr(line) if line is not None else "nothing" for line in (self.recorded, self.now))
+        recorded, now = (repr(line) if line else "nothing" for line in (self.recorded, self.now))
         return f"at {self.time_s:.3f} s, reply {self.reply}: recorded {recorded}, now {now}"
 
 

@@ -12,7 +12,7 @@ from protocol.conformance.profile import Profile
 from protocol.conformance.record import Record, read_record
 from protocol.conformance.replay import replay
 from protocol.conformance.stand import Stand, stand_beside
-from protocol.conformance.suite import Session, session_at
+from protocol.conformance.suite import session_at
 from protocol.conformance.suite_run import how_it_was_left
 from protocol.conformance.wire import RecordedPort, ReopenablePort, Wire
 

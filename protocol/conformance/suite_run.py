@@ -5,6 +5,7 @@ import os
 import shlex
 from collections.abc import Callable, Sequence
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
 from protocol.conformance.case import Case, only
@@ -77,20 +78,24 @@ def _junit_file(options: argparse.Namespace) -> Path:
 def _write(options: argparse.Namespace, header: Header, outcomes: Sequence[Outcome], junit: Path) -> bool:
     """Write the files, and return whether all could be; one that cannot takes none of the others with it."""
     report = options.out / "report.html"
-    written = True
-    for write in (
-        lambda: write_record(options.out / "record.json", header, outcomes),
-        lambda: write_junit(junit, header, outcomes),
-        lambda: write_report(report, header, outcomes, lambda case: _repeat(options, case)),
-    ):
-        try:
-            write()
-        except OSError as error:
-            say(str(error))
-            written = False
-    if written:
+    writers = (
+        partial(write_record, options.out / "record.json", header, outcomes),
+        partial(write_junit, junit, header, outcomes),
+        partial(write_report, report, header, outcomes, partial(_repeat, options)),
+    )
+    done = [_is_done(write) for write in writers]
+    if all(done):
         say(f"the report is {report}")
-    return written
+    return all(done)
+
+
+def _is_done(write: Callable[[], None]) -> bool:
+    try:
+        write()
+    except OSError as error:
+        say(str(error))
+        return False
+    return True
 
 
 def _progress(outcomes: list[Outcome], total: int, options: argparse.Namespace) -> Callable[[Outcome], None]:

@@ -11,6 +11,9 @@ CR = b"\r"
 _LONGEST_LINE = 256
 """What comes without a CR is a line that goes on up to here, and no line beyond."""
 
+_FLOOD = 20_000
+"""More bytes than a table on any line says in answer to anything."""
+
 
 class ReopenablePort(Port, Protocol):
     """A port of pyserial's, which can be opened again."""
@@ -135,12 +138,17 @@ class Wire:
         return self.forget()
 
     def drain(self, quiet_s: float, patience_s: float) -> bytes:
-        """Return, and forget, all that comes until nothing has come for a while, or patience ends."""
+        """Return, and forget, all that comes until nothing has come for a while, or patience ends.
+
+        A device that floods is not heard out.
+        """
         deadline_s = self._from_now_s(patience_s)
         heard = b""
-        while (more := self.listen(quiet_s)) and self.clock.now_s() < deadline_s:
+        while more := self.listen(quiet_s):
             heard += more
-        return heard + more
+            if self.clock.now_s() >= deadline_s or len(heard) > _FLOOD:
+                break
+        return heard
 
     def forget(self) -> bytes:
         """Return, and forget, what has been received and not been read as a line."""

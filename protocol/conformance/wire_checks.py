@@ -16,6 +16,9 @@ QUIET_S = 0.05
 _PATIENCE_S = 60.0
 """Five times the buffer are answered within it at 300 baud."""
 
+_SHOWN = 40
+"""Of bytes that are no line, so many are shown."""
+
 _STAND_STILL_S = 0.15
 """At 10 deg/s2 a table makes 0.11 deg in it."""
 
@@ -47,7 +50,9 @@ class WireChecks:
         """Return the next reply, which is that to `line`."""
         reply = self.wire.read_line(self.profile.serial.timeout_s)
         if reply is None:
-            raise NonconformityError(f"{line!r} got no reply within {self.profile.serial.timeout_s:g} s")
+            heard = self.wire.forget()[:_SHOWN]
+            without_cr = f", but {heard!r} without a CR" if heard else ""
+            raise NonconformityError(f"{line!r} got no reply within {self.profile.serial.timeout_s:g} s{without_cr}")
         return reply
 
     def expect(self, line: bytes, reply: bytes = b"OK") -> Line:

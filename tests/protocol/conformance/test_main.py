@@ -1,6 +1,7 @@
 """The command line: records, reports, replays, exit statuses, and one clear line for what cannot be."""
 
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import pytest
 
 from protocol.conformance.__main__ import main
 
+ROOT = Path(__file__).parents[3]
 TOO_STRICT = "[tolerance]\nspeed_share = 0.0001\n"
 
 
@@ -108,6 +110,47 @@ def test_a_place_that_is_no_directory_is_refused_before_the_run(
     assert (tmp_path / "file").read_text() == "precious"
 
 
+def test_a_file_that_cannot_be_written_takes_none_of_the_others_with_it(
+    out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (out / "record.json").mkdir(parents=True)
+    assert conformance("--port", "emulator://", "--case", "5.2/1$", "--out", out) == 2
+    said = capsys.readouterr()
+    assert said.out == "1 pass\n"
+    assert said.err == f"conformance: {out / 'record.json'}: cannot be written: Is a directory\n"
+    assert sorted(path.name for path in out.iterdir()) == ["junit.xml", "record.json", "report.html"]
+
+
+def test_a_reader_of_stdout_that_goes_away_costs_nothing_but_what_it_would_have_read(out: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    words = [sys.executable, "-m", "protocol.conformance", "--port", "emulator://", "--case", "5", "--out", str(out)]
+    result = subprocess.run(words, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert (result.returncode, result.stderr) == (0, f"conformance: the report is {out / 'report.html'}\n")
+    assert json.loads((out / "record.json").read_text())["verdicts"]["skipped"] == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "closed", "status", "said"),
+    [
+        ("--port emulator:// --case 5.4 --out out", "2>&-", 0, "2 skipped\n"),
+        ("--port emulator:// --case 5.4 --out out", ">&-", 0, "conformance: the report is out/report.html\n"),
+        ("--port loop:// --case 5.4 --out out", "<&- >&-", 2, "deg/s2; say --yes if it may\n"),
+    ],
+)
+def test_a_stream_that_is_closed_from_the_start_is_done_without(
+    words: str, closed: str, status: int, said: str, tmp_path: Path
+) -> None:
+    command = f"exec {sys.executable} -m protocol.conformance {words} {closed}"
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    result = subprocess.run(
+        ["sh", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == status
+    assert (result.stdout + result.stderr).endswith(said)
+
+
 def test_the_list_shows_clauses_and_needs(capsys: pytest.CaptureFixture[str]) -> None:
     assert conformance("--list", "--case", "6.2/1") == 0
     line = capsys.readouterr().out
@@ -121,6 +164,9 @@ def test_the_list_shows_clauses_and_needs(capsys: pytest.CaptureFixture[str]) ->
     [
         (["--port", "emulator://"], "give --port URL and --out DIR"),
         (["--port", "emulator://", "--out", "OUT", "--case", "12"], "--case: no case begins with 12"),
+        (["--port", "emulator://", "--out", "OUT", "--case", ""], "--case: a prefix is empty; leave the option out"),
+        (["--port", "emulator://", "--out", "OUT", "--junit", "/"], "--junit /: is a directory; name a file"),
+        (["--port", "emulator://", "--out", "/x", "--junit", "/x/record.json"], "goes to another file of --out; name"),
         (["--port", "/dev/no-such-table", "--out", "OUT"], "cannot open /dev/no-such-table"),
         (["--port", "loop://", "--out", "OUT", "--yes"], "loop://: 'H' got b'H\\r', which is no position; this is no"),
         (["--port", "loop://", "--out", "OUT"], "deg/s2; say --yes if it may"),
@@ -180,6 +226,12 @@ def test_a_record_sent_to_another_table_shows_where_the_answers_part(
         ({"version": 2}, "is of version 2; this program reads version 1"),
         ({"format": "a shopping list"}, "is no seventh-axis conformance record"),
         ({"cases": [{}]}, "is damaged: KeyError 'id'"),
+        ({"version": "1"}, "is of version '1'; this program reads version 1"),
+        ({"cases": []}, "holds no wire of these cases; nothing can be sent"),
+        ({"cases": [{"id": "0.0/0", "wire": [[0, "sent", "H\r"]]}]}, "holds no wire of these cases"),
+        ({"cases": [{"id": "4.5/4", "wire": [["soon", "sent", "H\r"]]}]}, "is damaged: ValueError 'soon' is no time"),
+        ({"cases": [{"id": "4.5/4", "wire": [[0, "shouted", "H\r"]]}]}, "'shouted' is none of sent, received, beside"),
+        ({"cases": [{"id": "4.5/4", "wire": [[0, "beside", "kick"]]}]}, "'kick' is nothing that is done beside the"),
         ({"home_deg": 90}, "the record began at 90; bring it there first"),
     ],
 )

@@ -1,6 +1,7 @@
 """The suite on a real pty and over TCP: a few short cases here, all of them in `.ci/conformance`."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -9,6 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from protocol.conformance.ports import SessionError, open_port
+from protocol.conformance.profile import load_profile
 
 SHORT = ("2.2/1", "3.1/5", "5.1/2", "6.2/2:power-on", "6.1/5", "7.3/3:near")
 COMMAND = [sys.executable, "-m", "protocol.conformance", "--yes"]
@@ -46,7 +50,10 @@ def test_the_stand_in_conforms_in_real_time(stand_in: StandIn, tmp_path: Path) -
     assert {case["verdict"] for case in record["cases"]} <= {"pass", "marginal"}
 
 
-def test_ctrl_c_stops_the_table_and_leaves_the_record(stand_in: StandIn, tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_and_a_polite_kill_stop_the_table_and_leave_the_record(
+    number: signal.Signals, stand_in: StandIn, tmp_path: Path
+) -> None:
     words = [
         "--port",
         stand_in.port,
@@ -59,14 +66,27 @@ def test_ctrl_c_stops_the_table_and_leaves_the_record(stand_in: StandIn, tmp_pat
     ]
     with subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         wait_for_motion(stand_in.control)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         _, said = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == 128 + number
     assert "interrupted after 0 of 1 cases; the table was stopped" in said
     state = state_of(stand_in.control)
     assert state["state"] == "idle"
     assert 1.0 < float(str(state["encoder_deg"])) < 369.0  # where it was, neither at home nor at its target
     assert (tmp_path / "out" / "record.json").exists()
+
+
+def test_two_runs_do_not_share_a_device() -> None:
+    ours, theirs = os.openpty()
+    try:
+        port = open_port(os.ttyname(theirs), load_profile())
+        with pytest.raises(SessionError, match=r"cannot open /dev/.*lock"):
+            open_port(os.ttyname(theirs), load_profile())
+        port.close()
+        open_port(os.ttyname(theirs), load_profile()).close()
+    finally:
+        os.close(ours)
+        os.close(theirs)
 
 
 def wait_for_motion(control: Path) -> None:
