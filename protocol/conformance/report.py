@@ -122,10 +122,10 @@ def _case(outcome: Outcome, repeat: Repeat) -> str:
 
 def _measurements(measurements: Sequence[Measurement]) -> str:
     rows = "".join(
-        f'<tr><td>{escape(one.name)}</td><td class="number">{one.value:.4g}</td><td>{one.unit}</td>'
+        f'<tr><td>{escape(one.name)}</td><td class="number">{one.value:.5g}</td><td>{one.unit}</td>'
         f"<td>{range_bar(one.value, one.least, one.most, one.verdict)}</td>"
-        f'<td class="soft">{"" if one.least is None else f"{one.least:.5g}"} &hellip; '
-        f"{'' if one.most is None else f'{one.most:.5g}'}</td></tr>"
+        f'<td class="soft">{"" if one.least is None else f"{one.least:.6g}"} &hellip; '
+        f"{'' if one.most is None else f'{one.most:.6g}'}</td></tr>"
         for one in measurements
     )
     return f"<table><tr><th>measured</th><th></th><th></th><th>within</th><th>range</th></tr>{rows}</table>"

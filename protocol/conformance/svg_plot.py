@@ -38,7 +38,7 @@ def range_bar(value: float, least: float | None, most: float | None, verdict: st
     """Return a bar for a range, with a mark where a value lies in it or beside it."""
     low = least if least is not None else min(0.0, value) if most is None or most >= 0 else 2 * most
     high = most if most is not None else 2 * low if low > 0 else max(1.0, 2 * value)
-    share = min(max((value - low) / (high - low) if high > low else 0.5, -0.12), 1.12)
+    share = min(max((value - low) / (high - low) if high > low else 0.5, -0.1), 1.1)
     return (
         '<svg class="bar" viewBox="0 0 130 12" role="img">'
         '<rect class="range" x="15" y="4" width="100" height="4" rx="2"/>'

@@ -24,7 +24,7 @@ def a_long_motion_is_a_trapezoid(rig: Rig) -> None:
 
 @case("7.1/1:backwards", travel_deg=30)
 def a_long_motion_backwards_is_a_trapezoid(rig: Rig) -> None:
-    """The same backwards, with other S and A."""
+    """Measure the same of a motion backwards, with other S and A: top speed, acceleration, deceleration."""
     allowed = rig.profile.motion
     _travel(rig, -30, *_readable(rig, 30, allowed.speed_deg_s, allowed.acceleration_deg_s2))
     _measure_trapezoid(rig)
@@ -47,7 +47,7 @@ def a_motion_takes_its_time(rig: Rig) -> None:
 
 @case("7.1/3:triangle", travel_deg=10)
 def a_short_motion_takes_its_time(rig: Rig) -> None:
-    """The same for a motion too short to reach S."""
+    """Compare the pace of a motion too short to reach S with the triangle's."""
     allowed = rig.profile.motion
     _travel(rig, 10, *_unhurried(rig, 10, allowed.speed_deg_s, allowed.acceleration_deg_s2 / 5))
     _measure_duration(rig)

@@ -34,7 +34,7 @@ def replies_come_in_order(rig: Rig) -> None:
 
 @case("5.1/2:motion", travel_deg=20)
 def replies_come_in_order_in_motion(rig: Rig) -> None:
-    """The same while the table moves, with readings in between that only grow."""
+    """While the table moves, send readings of both registers at once, three times; the position only grows."""
     rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2)
     rig.move_to(20)
     rig.follow(0.2)
