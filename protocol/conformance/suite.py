@@ -159,7 +159,7 @@ class Session:
                 rig.full_settings()
                 rig.stand_at_home()
             case.run(rig)
-            rig.silence("after its last reply the table")
+            rig.silence("after the last reply the line")
             self._restore(case, rig)
         except InapplicableError as error:
             return Verdict.SKIPPED, str(error)

@@ -17,6 +17,9 @@ class Verdict(StrEnum):
 MARGIN = 0.1
 """The share of a range, at each of its ends, in which a measurement is marginal."""
 
+_ROUNDING = 1e-9
+"""What binary fractions may make of a decimal that lies just at the end of its range."""
+
 
 class NonconformityError(Exception):
     """The table did not do what the clause says; the message says what it did instead."""
@@ -47,7 +50,7 @@ class Measurement:
         """Pass, or marginal near an end of the range, or fail outside of it."""
         low = float("-inf") if self.least is None else self.least
         high = float("inf") if self.most is None else self.most
-        if not low <= self.value <= high:
+        if not low - _ROUNDING <= self.value <= high + _ROUNDING:
             return Verdict.FAIL
         width = high - low
         if width == float("inf"):  # one end is open: the margin is a share of the other

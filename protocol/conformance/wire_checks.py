@@ -16,6 +16,8 @@ QUIET_S = 0.05
 _PATIENCE_S = 60.0
 """Five times the buffer are answered within it at 300 baud."""
 
+_WHITE_SPACE = "a reply ends in CR alone and has no space before it, clause 5.1/4"
+
 _SHOWN = 40
 """Of bytes that are no line, so many are shown."""
 
@@ -41,7 +43,7 @@ class WireChecks:
         """Send a line and return its reply.
 
         Raises:
-            NonconformityError: none came in time.
+            NonconformityError: none came in time, or there is white space around it.
         """
         self.wire.send(line + CR)
         return self.reply_to(line)
@@ -53,6 +55,7 @@ class WireChecks:
             heard = self.wire.forget()[:_SHOWN]
             without_cr = f", but {heard!r} without a CR" if heard else ""
             raise NonconformityError(f"{line!r} got no reply within {self.profile.serial.timeout_s:g} s{without_cr}")
+        require(reply.text == reply.text.strip(), f"{line!r} got {reply.text!r}: {_WHITE_SPACE}")
         return reply
 
     def expect(self, line: bytes, reply: bytes = b"OK") -> Line:
@@ -78,6 +81,7 @@ class WireChecks:
     def silence(self, why: str) -> None:
         """Require that nothing comes."""
         heard = self.wire.listen(QUIET_S + self.profile.serial.latency_s)
+        require(bool(heard.strip()) or not heard, f"{why} got {heard!r}: {_WHITE_SPACE}")
         require(not heard, f"{why} got {heard!r}, not silence")
 
     def drain(self) -> bytes:
@@ -93,11 +97,13 @@ class WireChecks:
         found = _ANGLE.fullmatch(reply.text)
         decimals = self.profile.serial.decimals
         if found is None or found[1] != letter or len(found[3]) != decimals:
-            raise NonconformityError(
-                f"{letter!r} got {reply.text!r}, not {letter.decode()} and an angle with {decimals} decimals"
-            )
+            places = f"{decimals} decimal{'s' * (decimals > 1)}"
+            raise NonconformityError(f"{letter!r} got {reply.text!r}, not {letter.decode()} and an angle with {places}")
         angle = Decimal(found[2].decode())
-        require(angle != 0 or not found[2].startswith(b"-"), f"{letter!r} got {reply.text!r}: zero has no sign")
+        require(
+            angle != 0 or not found[2].startswith(b"-"),
+            f"{letter!r} got {reply.text!r}: zero has no sign, clause 5.2/5",
+        )
         return angle
 
     @contextmanager

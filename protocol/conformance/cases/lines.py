@@ -44,7 +44,8 @@ def bytes_may_come_slowly(rig: Rig) -> None:
     for index in range(len(line)):
         rig.wire.send(line[index : index + 1])
         rig.wire.clock.sleep_s(0.02)
-    require(rig.reply_to(line).text == b"OK", f"{line!r}, byte by byte, was not accepted")
+    got = rig.reply_to(line).text
+    require(got == b"OK", f"{line!r}, byte by byte, got {got!r}, not b'OK'")
     rig.wire.send(b"H\rL")
     rig.angle_in(rig.reply_to(b"H"))
     rig.wire.send(b"\r")

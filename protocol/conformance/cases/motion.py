@@ -12,6 +12,8 @@ _RAMP_DEG = 5.0
 """From readings of a tenth of a degree, an acceleration can be told over such a way."""
 _RAMP_READINGS = 18
 """And from so many of them."""
+_LEAST_SPREAD = 1e-6
+"""Below it a line of least squares is drawn through a single point."""
 
 
 @case("7.1/1", travel_deg=30)
@@ -216,4 +218,6 @@ def _slope(samples: Sequence[Sample]) -> float:
         raise NonconformityError(f"only {len(samples)} positions could be read where at least 4 are needed")
     mean_s = sum(sample.time_s for sample in samples) / len(samples)
     spread = sum((sample.time_s - mean_s) ** 2 for sample in samples)
+    if spread < _LEAST_SPREAD:
+        raise NonconformityError(f"the table was read {len(samples)} times at the same place")
     return sum((sample.time_s - mean_s) * sample.position_deg for sample in samples) / spread

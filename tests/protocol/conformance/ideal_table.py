@@ -30,6 +30,7 @@ class Make:
     """From the CR of a command to the first byte of its reply."""
     acts_after: float = 0.5
     """The share of the latency after which the command is carried out."""
+    reply_end: bytes = b"\r"
     is_busy_meanwhile: bool = False
     """Whether a line waits in the buffer until the one before it is answered."""
 
@@ -241,6 +242,6 @@ class IdealPort:
                 return
             reply = f"ERR {reply} {_WORDS[reply - 1]}"
         self._said_s = max(time_s + make.latency_s, self._said_s)
-        for byte in reply.encode() + b"\r":
+        for byte in reply.encode() + make.reply_end:
             self._said_s += self._byte_s
             self._out.append((self._said_s, byte))

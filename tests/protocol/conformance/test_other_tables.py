@@ -75,6 +75,15 @@ def test_what_such_a_table_lacks_is_said(tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.parametrize("end", [b"\r\n", b" \r"])
+def test_a_flaw_of_every_reply_is_called_by_its_own_clause_in_every_case(end: bytes, tmp_path: Path) -> None:
+    outcomes = outcomes_of(Make(reply_end=end, error_replies=True, latency_s=0.01), tmp_path)
+    failed = [outcome for outcome in outcomes if outcome.verdict is Verdict.FAIL]
+    named = [outcome for outcome in failed if "clause 5.1/4" in outcome.reason]
+    assert len(failed) > 90
+    assert len(named) > 0.9 * len(failed), [outcome.reason for outcome in failed if outcome not in named]
+
+
 def test_a_counter_without_halves_cannot_show_how_they_are_rounded(tmp_path: Path) -> None:
     (outcome,) = [one for one in outcomes_of(Make(), tmp_path) if one.case.id == "5.2/4"]
     assert (outcome.verdict, outcome.reason) == (

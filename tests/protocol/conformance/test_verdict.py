@@ -20,6 +20,7 @@ from protocol.conformance.verdict import Measurement, Verdict
         (12.0, 10.0, None, Verdict.PASS),
         (10.5, 10.0, None, Verdict.MARGINAL),
         (9.0, 10.0, None, Verdict.FAIL),
+        (20.0 - 19.9, -0.1, 0.1, Verdict.MARGINAL),  # 0.10000000000000142 in binary
         (math.nan, 0.0, 10.0, Verdict.FAIL),
     ],
 )
