@@ -27,6 +27,7 @@ class RotaryTable:
 
     Attributes:
         url: what opens it. A table in process has nothing but `port`: each opening of `emulator://` is another table.
+        control: the control channel of a stand-in in another process, where there is one.
         profile: what is known of it.
     """
 
@@ -36,7 +37,7 @@ class RotaryTable:
             self.profile: Profile = load_profile(profile)
         except ProfileError as error:
             pytest.fail(str(error), pytrace=False)
-        self._control = control
+        self.control = control
         self._opened = False
 
     @cached_property
@@ -72,8 +73,10 @@ class RotaryTable:
         if not self._opened:
             return
         try:
+            if not getattr(self.port, "is_open", True):
+                self.port.open()  # a test may close it while the table moves
             self.client.stop()
-        except TableError:
+        except (TableError, OSError):
             pass  # a test may leave a table that does not answer
         finally:
             self.port.close()
@@ -81,7 +84,7 @@ class RotaryTable:
     @cached_property
     def _stand(self) -> Stand:
         # A pty has one client, so that what stands beside it does not open it.
-        return stand_beside(self.port, self._control, self.profile)
+        return stand_beside(self.port, self.control, self.profile)
 
     def _do(self, capability: str, deed: Callable[[Stand], None]) -> None:
         try:

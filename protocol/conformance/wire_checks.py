@@ -85,8 +85,8 @@ class WireChecks:
         require(not heard, f"{why} got {heard!r}, not silence")
 
     def drain(self) -> bytes:
-        """Return all that comes until the line has fallen silent."""
-        return self.wire.drain(QUIET_S + self.profile.serial.latency_s, _PATIENCE_S)
+        """Return all that comes until the line has fallen silent; a table may be slow to answer (2.2/1 is a should)."""
+        return self.wire.drain(self.profile.serial.latency_s + self.profile.serial.timeout_s / 3, _PATIENCE_S)
 
     def read(self, letter: bytes = b"H") -> Decimal:
         """Read a register in exactly the form that clause 5.2 gives it."""

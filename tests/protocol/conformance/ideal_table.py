@@ -28,6 +28,8 @@ class Make:
     baud: int = 9600
     latency_s: float = 0.08
     """From the CR of a command to the first byte of its reply."""
+    profile_latency_s: float | None = None
+    """What the profile says of it, where that is not the truth."""
     acts_after: float = 0.5
     """The share of the latency after which the command is carried out."""
     reply_end: bytes = b"\r"
@@ -44,7 +46,7 @@ class Make:
             baud = {self.baud}
             decimals = {self.decimals}
             error_replies = {str(self.error_replies).lower()}
-            latency_s = {max(self.latency_s, 0.01)}
+            latency_s = {self.profile_latency_s or max(self.latency_s, 0.01)}
             timeout_s = {3.0 if self.baud == 300 else 1.0}
             [limits]
             speed_deg_s = {self.top_speed}
