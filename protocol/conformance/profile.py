@@ -2,83 +2,26 @@
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
 from protocol.conformance.clauses import specification
+from protocol.conformance.profile_sections import (
+    MotionAllowed,
+    MotionValues,
+    RigProfile,
+    SerialProfile,
+    TableProfile,
+    Tolerance,
+)
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
 
 
 class ProfileError(ValueError):
     """A profile that cannot be used; the message names the file, the key and what is allowed."""
-
-
-@dataclass(frozen=True)
-class TableProfile:
-    """Which table it is."""
-
-    name: str
-    counts_per_deg: float
-
-
-@dataclass(frozen=True)
-class SerialProfile:
-    """The line, and the times on it."""
-
-    baud: int
-    decimals: int
-    error_replies: bool
-    buffer_bytes: int
-    latency_s: float
-    timeout_s: float
-
-
-@dataclass(frozen=True)
-class MotionValues:
-    """A speed and an acceleration."""
-
-    speed_deg_s: float
-    acceleration_deg_s2: float
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """How exact the table must be."""
-
-    rest_deg: float
-    tracking_deg: float
-    duration_share: float
-    duration_s: float
-    speed_share: float
-    acceleration_share: float
-    settling_s: float
-
-
-@dataclass(frozen=True)
-class MotionAllowed:
-    """How far, each way from its first position, and how fast the table may be moved."""
-
-    reach_deg: float
-    speed_deg_s: float
-    acceleration_deg_s2: float
-
-    def __str__(self) -> str:
-        return (
-            f"by up to {self.reach_deg:g} deg each way from where it stands, "
-            f"at up to {self.speed_deg_s:g} deg/s and {self.acceleration_deg_s2:g} deg/s2"
-        )
-
-
-@dataclass(frozen=True)
-class RigProfile:
-    """What the rig can do beyond the wire."""
-
-    sees_disconnect: bool
-    trigger_command: tuple[str, ...]
-    power_cycle_command: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -203,41 +146,51 @@ def _value(wanted: object, value: object, where: str) -> object:
 
 
 def _check_together(profile: Profile, source: str) -> None:
-    serial, motion, limits = profile.serial, profile.motion, profile.limits
-    unknown = [number for number in profile.waive if number not in specification()]
-    musts = [number for number in profile.waive if number not in unknown and specification()[number].level == "must"]
-    unreasoned = [number for number, reason in profile.waive.items() if not reason.strip()]
-    checks = (
-        (not 1 <= serial.decimals <= 6, f"serial.decimals is {serial.decimals}; it must be 1 to 6"),
-        (serial.buffer_bytes < 33, f"serial.buffer_bytes is {serial.buffer_bytes}; a line alone needs 33"),
-        (
-            serial.timeout_s <= serial.latency_s + 32 * profile.byte_s,
-            f"serial.timeout_s is {serial.timeout_s:g}; it must be more than serial.latency_s, {serial.latency_s:g}, "
-            f"and the time of 32 bytes, {32 * profile.byte_s:.2g}",
-        ),
-        (profile.table.counts_per_deg <= 0, "table.counts_per_deg is 0; it must be greater"),
-        (
-            profile.table.counts_per_deg > 0 and not motion.reach_deg < profile.range_deg,
-            f"motion.reach_deg is {motion.reach_deg:g}; with table.counts_per_deg {profile.table.counts_per_deg:g} "
-            f"the counter ends at {profile.range_deg:g}",
-        ),
-        (
-            profile.tolerance.tracking_deg <= profile.tolerance.rest_deg,
-            f"tolerance.tracking_deg is {profile.tolerance.tracking_deg:g}; it must be more than tolerance.rest_deg, "
-            f"{profile.tolerance.rest_deg:g}",
-        ),
-        (bool(unreasoned), f"waive.{', '.join(unreasoned)} is empty; it must say why"),
-        (bool(unknown), f"waive names {', '.join(unknown)}, which is no clause"),
-        (bool(musts), f"waive names {', '.join(musts)}, which is a must; only a should can be waived"),
-    )
-    for is_wrong, sentence in checks:
-        if is_wrong:
+    for sentences in (_wrong_line(profile), _wrong_motion(profile), _wrong_waivers(profile)):
+        for sentence in sentences:
             raise ProfileError(f"{source}: {sentence}")
+
+
+def _wrong_line(profile: Profile) -> Iterator[str]:
+    serial = profile.serial
+    if not 1 <= serial.decimals <= 6:
+        yield f"serial.decimals is {serial.decimals}; it must be 1 to 6"
+    if serial.buffer_bytes < 33:
+        yield f"serial.buffer_bytes is {serial.buffer_bytes}; a line alone needs 33"
+    bytes_s = 32 * profile.byte_s
+    if serial.timeout_s <= serial.latency_s + bytes_s:
+        yield (
+            f"serial.timeout_s is {serial.timeout_s:g}; it must be more than serial.latency_s, {serial.latency_s:g}, "
+            f"and the time of 32 bytes, {bytes_s:.2g}"
+        )
+
+
+def _wrong_motion(profile: Profile) -> Iterator[str]:
+    count_deg, reach_deg, tolerance = profile.table.counts_per_deg, profile.motion.reach_deg, profile.tolerance
+    if count_deg <= 0:
+        yield "table.counts_per_deg is 0; it must be greater"
+    elif reach_deg >= profile.range_deg:
+        yield (
+            f"motion.reach_deg is {reach_deg:g}; with table.counts_per_deg {count_deg:g} "
+            f"the counter ends at {profile.range_deg:g}"
+        )
+    if tolerance.tracking_deg <= tolerance.rest_deg:
+        yield (
+            f"tolerance.tracking_deg is {tolerance.tracking_deg:g}; it must be more than tolerance.rest_deg, "
+            f"{tolerance.rest_deg:g}"
+        )
     for key in ("speed_deg_s", "acceleration_deg_s2"):
-        limit = getattr(limits, key)
-        for section, values in (("motion", motion), ("power_on", profile.power_on)):
-            if not 0 < (value := getattr(values, key)) <= limit:
-                raise ProfileError(
-                    f"{source}: {section}.{key} is {value:g}; "
-                    f"it must be greater than 0 and at most limits.{key}, {limit:g}"
-                )
+        limit = getattr(profile.limits, key)
+        for section in ("motion", "power_on"):
+            if not 0 < (value := getattr(getattr(profile, section), key)) <= limit:
+                yield (f"{section}.{key} is {value:g}; it must be greater than 0 and at most limits.{key}, {limit:g}")
+
+
+def _wrong_waivers(profile: Profile) -> Iterator[str]:
+    for number, reason in profile.waive.items():
+        if number not in specification():
+            yield f"waive names {number}, which is no clause"
+        elif specification()[number].level == "must":
+            yield f"waive names {number}, which is a must; only a should can be waived"
+        elif not reason.strip():
+            yield f"waive.{number} is empty; it must say why"
