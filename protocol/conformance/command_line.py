@@ -30,7 +30,8 @@ def ended_by_signals() -> Iterator[None]:
     for name in _ENDING:
         number = getattr(signal, name, None)  # not every system has them
         if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # nohup has SIGHUP ignored
-            before[number] = signal.signal(number, _end)
+            with suppress(ValueError):  # only a program's main thread may say so
+                before[number] = signal.signal(number, _end)
     try:
         yield
     finally:

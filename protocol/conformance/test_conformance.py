@@ -7,6 +7,7 @@ from contextlib import ExitStack
 import pytest
 
 from protocol.conformance.case import Case, all_cases
+from protocol.conformance.command_line import ended_by_signals
 from protocol.conformance.fixture import pty_stand_in
 from protocol.conformance.host_watch import watch_in
 from protocol.conformance.ports import SessionError, is_simulated, open_port
@@ -30,6 +31,7 @@ def session(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactor
             profile = load_profile(pytestconfig.getoption("--table-profile"))
             port = open_port(url, profile)
             stack.callback(port.close)
+            stack.enter_context(ended_by_signals())
             if not may_move and not is_simulated(port):
                 pytest.exit(f"the table at {url} will turn {profile.motion}; say --table-yes if it may", returncode=2)
             stand = stand_beside(port, control, profile)

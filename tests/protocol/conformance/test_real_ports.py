@@ -76,6 +76,21 @@ def test_ctrl_c_and_a_polite_kill_stop_the_table_and_leave_the_record(
     assert (tmp_path / "out" / "record.json").exists()
 
 
+def test_a_polite_kill_of_pytest_stops_the_table_too(stand_in: StandIn, tmp_path: Path) -> None:
+    plugin = ["-p", "no:cacheprovider", "-p", "protocol.conformance.pytest_plugin"]
+    table = ["--table-port", stand_in.port, "--table-control", str(stand_in.control), "--table-yes"]
+    command = [sys.executable, "-m", "pytest", *plugin, "--pyargs", "protocol.conformance", *table, "-k", "4.2/3"]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
+    with subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE) as process:
+        wait_for_motion(stand_in.control)
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=60)
+    assert process.returncode == pytest.ExitCode.INTERRUPTED
+    state = state_of(stand_in.control)
+    assert state["state"] == "idle"
+    assert 1.0 < float(str(state["encoder_deg"])) < 369.0
+
+
 def test_two_runs_do_not_share_a_device() -> None:
     ours, theirs = os.openpty()
     try:
