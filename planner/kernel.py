@@ -24,8 +24,9 @@ def cache_directory() -> Path:
     It lies under numba's own cache folder where one is set (`NUMBA_CACHE_DIR`), else under the user's.
     """
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    package = Path(__file__).parent
+    for source in sorted(package.rglob("*.py")):
+        digest.update(str(source.relative_to(package)).encode() + b"\0" + source.read_bytes())
     user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "seventh-axis"
     return Path(os.environ.get("NUMBA_CACHE_DIR") or user_cache) / digest.hexdigest()[:16]
 

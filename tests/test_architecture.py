@@ -3,7 +3,7 @@
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -16,6 +16,9 @@ MAY_IMPORT = {
     "planner": {"planner", "protocol"},
     "tools": {"emulator", "planner", "protocol", "tools"},
 }
+
+PLANNER_LAYERS = ["geometry", "kinematics", "table", "cell", "map", "planning", "execution", "scanning", "commands"]
+"""The planner's folders from the lowest up; each may import from those before it, and from the files beside them."""
 
 EDGE_MODULES = {
     "asyncio",
@@ -72,22 +75,51 @@ EMULATOR_EDGE = {
 }
 
 
-def imported_packages(source: Path) -> Iterator[str]:
-    """Yield the top-level name of each import, those inside functions included."""
+def imported_modules(source: Path) -> Iterator[str]:
+    """Yield the full name of each module that is imported, those inside functions included."""
     for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from (alias.name.partition(".")[0] for alias in node.names)
+            yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            yield source.relative_to(ROOT).parts[0] if node.level else str(node.module).partition(".")[0]
+            assert not node.level, f"{source}: a relative import"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def imported_packages(source: Path) -> Iterator[str]:
+    return (name.partition(".")[0] for name in imported_modules(source))
+
+
+def imports_from(packages: Iterable[str], sources: Iterable[Path]) -> list[tuple[str, str]]:
+    """Return which source imports what from any of some packages, which are given by their full names."""
+    beginnings = tuple(f"{package}." for package in packages)
+    return [
+        (str(source), name)
+        for source in sources
+        for name in imported_modules(source)
+        if f"{name}.".startswith(beginnings)
+    ]
 
 
 @pytest.mark.parametrize("package", MAY_IMPORT)
 def test_imports_run_one_way(package: str) -> None:
-    forbidden = MAY_IMPORT.keys() - MAY_IMPORT[package]
     sources = sorted((ROOT / package).rglob("*.py"))
     assert sources
-    wrong = [(str(source), name) for source in sources for name in imported_packages(source) if name in forbidden]
-    assert wrong == []
+    assert imports_from(MAY_IMPORT.keys() - MAY_IMPORT[package], sources) == []
+
+
+def test_each_folder_of_the_planner_is_a_layer() -> None:
+    assert {source.parent.name for source in (ROOT / "planner").glob("*/*.py")} == set(PLANNER_LAYERS)
+
+
+@pytest.mark.parametrize("layer", PLANNER_LAYERS)
+def test_the_planner_s_layers_import_only_from_those_below(layer: str) -> None:
+    above = PLANNER_LAYERS[PLANNER_LAYERS.index(layer) + 1 :]
+    assert imports_from([f"planner.{name}" for name in above], (ROOT / "planner" / layer).rglob("*.py")) == []
+
+
+def test_the_files_beside_the_planner_s_layers_need_none_of_them() -> None:
+    sources = set((ROOT / "planner").glob("*.py")) - {ROOT / "planner/__main__.py"}
+    assert imports_from([f"planner.{name}" for name in PLANNER_LAYERS], sources) == []
 
 
 def touched_at_the_edge(package: str) -> dict[str, set[str]]:

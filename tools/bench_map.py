@@ -11,15 +11,15 @@ import coal
 import numpy as np
 from py_opw_kinematics import KinematicModel, Robot
 
-from planner.arm import Arm
 from planner.arrays import FloatArray
-from planner.capsule import segment_distance
-from planner.configuration import Configuration
-from planner.inverse_kinematics import inverse_kinematics
+from planner.cell.scan import load_scan, shipped_scans
+from planner.geometry.capsule import segment_distance
 from planner.kernel import kernel
-from planner.map_builder import build_maps
-from planner.map_problem import MapProblem, map_problem
-from planner.scan import load_scan, shipped_scans
+from planner.kinematics.arm import Arm
+from planner.kinematics.configuration import Configuration
+from planner.kinematics.inverse_kinematics import inverse_kinematics
+from planner.map.map_builder import build_maps
+from planner.map.map_problem import MapProblem, map_problem
 from tools.timing import median_s, print_table
 
 POSES = 20_000

@@ -11,25 +11,25 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
+from planner.cell.scan import load_scan, shipped_scans
 from planner.commands.plan import problem_of
-from planner.configuration import Configuration
-from planner.cost import Weights, default_weights
-from planner.cost_to_go import cost_to_go, lay_out_columns
-from planner.dijkstra import Cells, lattice_path
-from planner.dynamic_programming import dynamic_programming, follow
-from planner.map_builder import build_maps
-from planner.map_problem import map_problem
-from planner.motion import Limits
-from planner.plan import Outcome, Plan
-from planner.planners import PLANNERS, Planner
-from planner.problem import Problem
-from planner.ray_shooting import Rays, ray_shooting
-from planner.receding import FAST_SPEED_COUNT, SPEED_COUNT, online_step, prepare_online_step, receding
-from planner.scan import load_scan, shipped_scans
-from planner.smoothing import smooth
-from planner.state_grid import Grid, exact_grid
-from planner.synthetic_maps import MapFamily, synthetic_map
-from planner.verification import verify
+from planner.kinematics.configuration import Configuration
+from planner.map.map_builder import build_maps
+from planner.map.map_problem import map_problem
+from planner.map.synthetic_maps import MapFamily, synthetic_map
+from planner.planning.cost_to_go import cost_to_go, lay_out_columns
+from planner.planning.dijkstra import Cells, lattice_path
+from planner.planning.dynamic_programming import dynamic_programming, follow
+from planner.planning.plan import Outcome, Plan
+from planner.planning.planners import PLANNERS, Planner
+from planner.planning.problem import Problem
+from planner.planning.ray_shooting import Rays, ray_shooting
+from planner.planning.receding import FAST_SPEED_COUNT, SPEED_COUNT, online_step, prepare_online_step, receding
+from planner.planning.smoothing import smooth
+from planner.planning.state_grid import Grid, exact_grid
+from planner.planning.verification import verify
+from planner.table.cost import Weights, default_weights
+from planner.table.motion import Limits
 
 MAPS_PER_FAMILY = 20
 

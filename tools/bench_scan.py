@@ -14,12 +14,12 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.arrays import FloatArray
-from planner.latched_run import TriggerConditions
-from planner.probe import LaserProbe, measure
-from planner.ray_casting import RayCaster
-from planner.scan import load_scan
-from planner.scan_path import looking_at
-from planner.scan_run import ScanOptions, scan_workpiece
+from planner.cell.scan import load_scan
+from planner.cell.scan_path import looking_at
+from planner.geometry.ray_casting import RayCaster
+from planner.scanning.latched_run import TriggerConditions
+from planner.scanning.probe import LaserProbe, measure
+from planner.scanning.scan_run import ScanOptions, scan_workpiece
 from tools.timing import median_s, print_table
 
 _LINES = 256

@@ -8,14 +8,14 @@ from typing import TextIO
 import numpy as np
 
 from planner.arrays import FloatArray
-from planner.cost import PathCost
-from planner.execute import Settings
-from planner.motion import Limits, roll_out
-from planner.plan import Plan
-from planner.scan import shipped_scans
-from planner.stream import TimedCommand, reference_states, rounded_stream, stream
-from planner.table_motion import TableMotion
-from planner.wire import Wire
+from planner.cell.scan import shipped_scans
+from planner.execution.execute import Settings
+from planner.execution.stream import TimedCommand, reference_states, rounded_stream, stream
+from planner.execution.table_motion import TableMotion
+from planner.planning.plan import Plan
+from planner.table.cost import PathCost
+from planner.table.motion import Limits, roll_out
+from planner.table.wire import Wire
 from tools.timing import print_table
 from tools.virtual_run import VirtualRun, random_run_inputs, run_in_virtual_time, shipped_run_input
 

@@ -17,19 +17,19 @@ from matplotlib.image import AxesImage
 from mpl_toolkits.mplot3d.axes3d import Axes3D  # type: ignore[import-untyped]  # matplotlib has no types for it
 
 from planner.arrays import FloatArray
-from planner.config_map import ConfigurationMap
-from planner.cost import Weights
-from planner.crossing import step_is_allowed
-from planner.dijkstra import Cells, dijkstra
-from planner.dynamic_programming import dynamic_programming
-from planner.local_maxima import local_maxima
-from planner.motion import Limits, limited_acceleration, next_angle, next_speed
-from planner.plan import Outcome, Plan
-from planner.plan_plots import CURVE_COLOUR, PLAN_COLOUR, draw_motion, draw_wrapped
-from planner.problem import Problem
-from planner.ray_shooting import Rays, cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
-from planner.synthetic_maps import MapFamily, blocks_map, synthetic_map
-from planner.value import joint_factor
+from planner.kinematics.value import joint_factor
+from planner.map.config_map import ConfigurationMap
+from planner.map.synthetic_maps import MapFamily, blocks_map, synthetic_map
+from planner.planning.crossing import step_is_allowed
+from planner.planning.dijkstra import Cells, dijkstra
+from planner.planning.dynamic_programming import dynamic_programming
+from planner.planning.local_maxima import local_maxima
+from planner.planning.plan import Outcome, Plan
+from planner.planning.plan_plots import CURVE_COLOUR, PLAN_COLOUR, draw_motion, draw_wrapped
+from planner.planning.problem import Problem
+from planner.planning.ray_shooting import Rays, cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
+from planner.table.cost import Weights
+from planner.table.motion import Limits, limited_acceleration, next_angle, next_speed
 from planner.whole_file import whole_file
 
 RAY_COLOUR = "#7fb2e5"

@@ -7,24 +7,24 @@ from typing import NamedTuple
 import numpy as np
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
-from planner.config_map import ConfigurationMap
-from planner.configuration import Configuration
-from planner.dynamic_programming import dynamic_programming
-from planner.execute import Settings, bring_to, execute
-from planner.inside_view import view_of
-from planner.map_builder import build_maps
-from planner.map_problem import map_problem
-from planner.motion import Limits
-from planner.plan import Plan
-from planner.problem import Problem
-from planner.run_input import RunInput
-from planner.run_record import Record
-from planner.run_verification import RunVerification, verify_run
-from planner.scan import load_scan
-from planner.synthetic_maps import MapFamily, synthetic_map
-from planner.table_motion import TableMotion
-from planner.table_port import open_port
-from planner.wire import Wire
+from planner.cell.scan import load_scan
+from planner.execution.execute import Settings, bring_to, execute
+from planner.execution.inside_view import view_of
+from planner.execution.run_input import RunInput
+from planner.execution.run_record import Record
+from planner.execution.run_verification import RunVerification, verify_run
+from planner.execution.table_motion import TableMotion
+from planner.execution.table_port import open_port
+from planner.kinematics.configuration import Configuration
+from planner.map.config_map import ConfigurationMap
+from planner.map.map_builder import build_maps
+from planner.map.map_problem import map_problem
+from planner.map.synthetic_maps import MapFamily, synthetic_map
+from planner.planning.dynamic_programming import dynamic_programming
+from planner.planning.plan import Plan
+from planner.planning.problem import Problem
+from planner.table.motion import Limits
+from planner.table.wire import Wire
 from protocol import TableClient
 
 

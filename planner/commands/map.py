@@ -6,16 +6,16 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 
+from planner.cell.scan import load_scan
 from planner.commands import options
-from planner.config_map import ConfigurationMap
-from planner.configuration import Configuration
 from planner.errors import PlannerError
-from planner.map_builder import build_maps
-from planner.map_file import MAP_FILE, save_maps
-from planner.map_plots import plot_map, plot_map_cylinder
-from planner.map_problem import map_problem
+from planner.kinematics.configuration import Configuration
+from planner.map.config_map import ConfigurationMap
+from planner.map.map_builder import build_maps
+from planner.map.map_file import MAP_FILE, save_maps
+from planner.map.map_plots import plot_map, plot_map_cylinder
+from planner.map.map_problem import map_problem
 from planner.progress import progress_line
-from planner.scan import load_scan
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from planner.scan import shipped_scans
+from planner.cell.scan import shipped_scans
 
 
 def add_scan(parser: argparse.ArgumentParser) -> None:

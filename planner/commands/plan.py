@@ -8,26 +8,26 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from planner.arm_motion import arm_motion
-from planner.best_configuration import best_configuration
+from planner.cell.scan import Scan, load_scan
 from planner.commands import options
-from planner.config_map import ConfigurationMap
-from planner.configuration import Configuration
 from planner.errors import PlannerError
-from planner.joint_path import JointPath
-from planner.map_builder import build_maps
-from planner.map_file import MAP_FILE, save_maps
-from planner.map_problem import map_problem
-from planner.plan import NoPlan, Outcome, Plan
-from planner.plan_file import plan_document, save_plan
-from planner.plan_plots import plot_plan
-from planner.planners import DEFAULT_PLANNER, PLANNERS, Planner
-from planner.problem import Problem
+from planner.kinematics.configuration import Configuration
+from planner.kinematics.joint_path import JointPath
+from planner.map.config_map import ConfigurationMap
+from planner.map.map_builder import build_maps
+from planner.map.map_file import MAP_FILE, save_maps
+from planner.map.map_problem import map_problem
+from planner.planning.arm_motion import arm_motion
+from planner.planning.best_configuration import best_configuration
+from planner.planning.plan import NoPlan, Outcome, Plan
+from planner.planning.plan_file import plan_document, save_plan
+from planner.planning.plan_plots import plot_plan
+from planner.planning.planners import DEFAULT_PLANNER, PLANNERS, Planner
+from planner.planning.problem import Problem
+from planner.planning.smoothing import smooth
+from planner.planning.verification import verify
 from planner.progress import progress_line
 from planner.reasons import Reason
-from planner.scan import Scan, load_scan
-from planner.smoothing import smooth
-from planner.verification import verify
 
 _NO_PLAN = 1
 

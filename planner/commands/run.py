@@ -6,10 +6,10 @@ from pathlib import Path
 
 from planner.commands import options
 from planner.errors import PlannerError
-from planner.execute import Settings
+from planner.execution.execute import Settings
+from planner.execution.run import RunOptions, run_plan
+from planner.execution.run_verification import DEFAULT_TOLERANCE_DEG, RunVerification
 from planner.progress import progress_line
-from planner.run import RunOptions, run_plan
-from planner.run_verification import DEFAULT_TOLERANCE_DEG, RunVerification
 from protocol import TableError
 
 _DEVIATED, _NOT_RUN = 1, 2

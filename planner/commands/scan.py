@@ -4,14 +4,14 @@ import argparse
 import sys
 from pathlib import Path
 
+from planner.cell.scan import load_scan, with_mesh
 from planner.commands import options
 from planner.errors import PlannerError
-from planner.latched_run import TriggerConditions
 from planner.progress import progress_line
-from planner.scan import load_scan, with_mesh
-from planner.scan_file import save_scan, scan_document
-from planner.scan_report import scan_report, verdict_of
-from planner.scan_run import Scanned, ScanOptions, scan_workpiece
+from planner.scanning.latched_run import TriggerConditions
+from planner.scanning.scan_file import save_scan, scan_document
+from planner.scanning.scan_report import scan_report, verdict_of
+from planner.scanning.scan_run import Scanned, ScanOptions, scan_workpiece
 from planner.whole_file import write_whole
 from protocol import TableError
 

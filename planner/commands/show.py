@@ -5,9 +5,9 @@ import sys
 from pathlib import Path
 
 from planner.errors import PlannerError
-from planner.run_file import load_run
-from planner.run_report import run_report
-from planner.run_verification import verify_run
+from planner.execution.run_file import load_run
+from planner.execution.run_report import run_report
+from planner.execution.run_verification import verify_run
 from planner.whole_file import write_whole
 
 REPORT_FILE = "report.html"

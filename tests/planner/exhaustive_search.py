@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planner.config_map import ConfigurationMap
-from planner.plan import Plan
-from planner.problem import Problem
+from planner.map.config_map import ConfigurationMap
+from planner.planning.plan import Plan
+from planner.planning.problem import Problem
 
 SUB_STEPS = 64
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any, cast
 
-from planner.table_port import open_port
+from planner.execution.table_port import open_port
 from protocol import Clock
 
 Fault = Callable[[bytes], bytes]

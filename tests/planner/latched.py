@@ -6,13 +6,13 @@ import numpy as np
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.arrays import FloatArray
-from planner.cost import PathCost
-from planner.latched_run import LatchedRun, TriggerConditions, run_latched
-from planner.motion import Limits, roll_out
-from planner.plan import Plan
-from planner.table_port import open_port
-from planner.trigger_line import ProbeOnPort
-from planner.wire import Wire
+from planner.execution.table_port import open_port
+from planner.planning.plan import Plan
+from planner.scanning.latched_run import LatchedRun, TriggerConditions, run_latched
+from planner.scanning.trigger_line import ProbeOnPort
+from planner.table.cost import PathCost
+from planner.table.motion import Limits, roll_out
+from planner.table.wire import Wire
 from protocol import TableClient
 
 LIMITS = Limits(40.0, 100.0)

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from planner.config_map import ConfigurationMap
-from planner.configuration import Configuration
-from planner.dynamic_programming import dynamic_programming
-from planner.map_file import save_maps
-from planner.motion import roll_out
-from planner.plan import Pause, Plan, make_plan
-from planner.problem import Problem
-from planner.run_input import RunInput
-from planner.synthetic_maps import blocks_map
+from planner.execution.run_input import RunInput
+from planner.kinematics.configuration import Configuration
+from planner.map.config_map import ConfigurationMap
+from planner.map.map_file import save_maps
+from planner.map.synthetic_maps import blocks_map
+from planner.planning.dynamic_programming import dynamic_programming
+from planner.planning.plan import Pause, Plan, make_plan
+from planner.planning.problem import Problem
+from planner.table.motion import roll_out
 
 CONFIGURATION = Configuration.parse("LEFTY-ABOVE-NOFLIP")
 LOCATIONS = 16

@@ -1,10 +1,10 @@
 import pytest
 
-from planner.dijkstra import Cells, lattice_path
-from planner.motion import Limits
-from planner.plan import Plan
-from planner.problem import Problem
-from planner.synthetic_maps import MapFamily, synthetic_map
+from planner.map.synthetic_maps import MapFamily, synthetic_map
+from planner.planning.dijkstra import Cells, lattice_path
+from planner.planning.plan import Plan
+from planner.planning.problem import Problem
+from planner.table.motion import Limits
 from tools.bench_planner import lattice_optimum, median_seconds
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from planner.execute import Settings
-from planner.motion import Limits
-from planner.stream import rounded_stream, stream
+from planner.execution.execute import Settings
+from planner.execution.stream import rounded_stream, stream
+from planner.table.motion import Limits
 from tools.bench_stream import LEAD_S, errors_at_locations, random_plan
 from tools.virtual_run import random_run_inputs, run_in_virtual_time
 

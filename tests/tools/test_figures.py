@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.plan import Plan
-from planner.ray_shooting import cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
-from planner.verification import verify
+from planner.planning.plan import Plan
+from planner.planning.ray_shooting import cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
+from planner.planning.verification import verify
 from tools.figures import (
     FIGURES,
     MOMENTS,

@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 
 from planner.__main__ import main
-from planner.configuration import Configuration
-from planner.map_file import load_maps
+from planner.kinematics.configuration import Configuration
+from planner.map.map_file import load_maps
 
 SMALL = ["--angles", "24"]
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from planner.__main__ import main
-from planner.plan_file import load_plan
-from planner.planners import PLANNERS
+from planner.planning.plan_file import load_plan
+from planner.planning.planners import PLANNERS
 
 SMALL = ["--angles", "60", "--configuration", "LEFTY-ABOVE-NOFLIP"]
 

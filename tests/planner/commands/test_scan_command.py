@@ -9,10 +9,10 @@ import trimesh
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.__main__ import main
 from planner.arrays import FloatArray
-from planner.scan import load_scan, shipped_scans
-from planner.scan_file import scan_document
-from planner.scan_report import scan_report
-from planner.scan_run import ScanOptions, scan_workpiece
+from planner.cell.scan import load_scan, shipped_scans
+from planner.scanning.scan_file import scan_document
+from planner.scanning.scan_report import scan_report
+from planner.scanning.scan_run import ScanOptions, scan_workpiece
 
 SMALL = """
 [cell]

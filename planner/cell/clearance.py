@@ -1,0 +1,232 @@
+"""Clearance of the arm, the probe and its beam from each other and from the cell (section 3 of the paper).
+
+The clearance of a pose is the least signed distance of all pairs that can meet, so that the value function can grade
+proximity, and the pair that has it is the reason where it is too small. The beam is a light ray and not a body: near
+is fine, so it counts only where something blocks it.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from planner.arrays import FloatArray, IndexArray
+from planner.cell.bodies import FLANGE_FRAME
+from planner.cell.collision_model import (
+    END,
+    FRAME,
+    KIND,
+    LOWER,
+    RADIUS,
+    SIZE,
+    START,
+    UPPER,
+    CollisionModel,
+    base_in_obstacles,
+)
+from planner.cell.obstacles import FIELD
+from planner.geometry.capsule import segment_distance
+from planner.geometry.signed_distance_field import field_distance
+from planner.geometry.solid import solid_distance
+from planner.kernel import kernel
+from planner.kinematics.arm import Arm, link_frames
+
+ARM_FRAMES = 4
+"""The frames from the base's on that bodies move with; none moves with the wrist's, and then comes the flange's."""
+
+# The columns of a placed body: its ends and its middle in the base, half its length; all in mm.
+_MIDDLE, _HALF_LENGTH = 6, 9
+PLACED = 10
+"""Columns of the table of placed bodies."""
+
+
+class Clearances(NamedTuple):
+    """The clearance `(n,)` in mm, and the nearest pair `(n,)` as an index into the model's pairs."""
+
+    clearance_mm: FloatArray
+    pair: IndexArray
+
+
+def clearances(
+    model: CollisionModel, arm: Arm, joints: FloatArray, table_angles_deg: FloatArray, stand_off_mm: float
+) -> Clearances:
+    """Return the clearance of each pose, without a bound.
+
+    Args:
+        model: What can collide.
+        arm: The arm.
+        joints: `(n, 6)`, in radians.
+        table_angles_deg: `(n,)`.
+        stand_off_mm: The probe's distance from the surface along its beam.
+
+    Raises:
+        ValueError: A joint or an angle is not a finite number.
+    """
+    if not (np.isfinite(joints).all() and np.isfinite(table_angles_deg).all()):
+        raise ValueError("a joint or a table angle is not a finite number; only reached poses have a clearance")
+    clearance_mm, pair = np.empty(len(joints)), np.empty(len(joints), dtype=np.int64)
+    _clearance_of_each(
+        arm.table,
+        np.ascontiguousarray(joints),
+        model.beam_mm(stand_off_mm),
+        model.pairs,
+        model.bodies,
+        model.obstacles,
+        *model.field,
+        base_in_obstacles(model, table_angles_deg),
+        clearance_mm,
+        pair,
+    )
+    return Clearances(clearance_mm, pair)
+
+
+# Kernels take numbers and arrays, not the model: each array that is fetched from a tuple, and each view of an array,
+# is a counted reference, which costs more than the arithmetic here.
+
+
+@kernel
+def place_bodies(
+    bodies: FloatArray, frames: FloatArray, beam_mm: float, first: int, last: int, placed: FloatArray
+) -> None:
+    """Write the ends in the base of the bodies that move with the frames `first` to `last` into `placed`.
+
+    Args:
+        bodies: See `CollisionModel`.
+        frames: `(7, 3, 4)`, see `planner.kinematics.arm.link_frames`.
+        beam_mm: The beam's length.
+        first: The first frame.
+        last: The last frame.
+        placed: Written: `(n_bodies, PLACED)`, x y z of the start, the end and the middle, and half the length.
+    """
+    for body in range(len(bodies)):
+        f = int(bodies[body, FRAME])
+        if not first <= f <= last:
+            continue
+        half2 = 0.0
+        for row in range(3):
+            r0, r1, r2, origin = frames[f, row, 0], frames[f, row, 1], frames[f, row, 2], frames[f, row, 3]
+            start = r0 * bodies[body, START] + r1 * bodies[body, START + 1] + r2 * bodies[body, START + 2]
+            end = r0 * bodies[body, END] + r1 * bodies[body, END + 1] + r2 * bodies[body, END + 2]
+            if body == len(bodies) - 1:
+                end = start + beam_mm * (end - start)
+            placed[body, row] = start + origin
+            placed[body, 3 + row] = end + origin
+            placed[body, _MIDDLE + row] = 0.5 * (start + end) + origin
+            half2 += 0.25 * (end - start) * (end - start)
+        placed[body, _HALF_LENGTH] = sqrt(half2)
+
+
+@kernel
+def nearest_pair(
+    pairs: IndexArray, bodies: FloatArray, obstacles: FloatArray,
+    field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
+    placed: FloatArray, obstacle_frames: FloatArray, angle: int, first: int, last: int, enough_mm: float,
+) -> tuple[float, int]:  # fmt: skip
+    """Return the least clearance in mm of the pairs `first` to `last` - 1 and the pair that has it.
+
+    Clearances of `enough_mm` or more are of no interest: if there is nothing below, that and -1 are returned.
+
+    Args:
+        pairs: See `CollisionModel`.
+        bodies: See `CollisionModel`.
+        obstacles: See `CollisionModel`.
+        field_values: The model's field.
+        field_origin: Its origin.
+        field_spacing: Its spacing.
+        placed: `(n_bodies, PLACED)`, see `place_bodies`.
+        obstacle_frames: `(n_angles, n_obstacles, 3, 4)`, see `base_in_obstacles`.
+        angle: Which of the table angles.
+        first: The first pair to look at.
+        last: The pair after the last one.
+        enough_mm: The clearance from which on a pair is far enough apart.
+    """
+    beam = len(bodies) - 1
+    least, nearest = enough_mm, -1
+    for pair in range(first, last):
+        body, other = pairs[pair, 0], pairs[pair, 1]
+        radius = bodies[body, RADIUS]
+        bound = min(least, 0.0) if body == beam else least
+        if other <= beam:
+            radius += bodies[other, RADIUS]
+            if _spheres_apart(placed, body, other, bound + radius):
+                continue
+            distance = _body_distance(placed, body, other)
+        else:
+            i = other - beam - 1
+            x, y, z = _in_frame(obstacle_frames, angle, i, placed, body, _MIDDLE)
+            if _sphere_outside(obstacles, i, x, y, z, placed[body, _HALF_LENGTH] + bound + radius):
+                continue
+            ax, ay, az = _in_frame(obstacle_frames, angle, i, placed, body, 0)
+            bx, by, bz = _in_frame(obstacle_frames, angle, i, placed, body, 3)
+            kind = int(obstacles[i, KIND])
+            if kind == FIELD:
+                distance = field_distance(
+                    field_values, field_origin, field_spacing, ax, ay, az, bx, by, bz, bound + radius
+                )
+            else:
+                distance = solid_distance(
+                    kind, obstacles[i, SIZE], obstacles[i, SIZE + 1], obstacles[i, SIZE + 2],
+                    ax, ay, az, bx, by, bz, bound + radius,
+                )  # fmt: skip
+        # Not by the difference: it would take a distance that is only known to be enough for a smaller one.
+        if distance < bound + radius:
+            least, nearest = distance - radius, pair
+    return least, nearest
+
+
+@kernel
+def _spheres_apart(placed: FloatArray, a: int, b: int, enough_mm: float) -> bool:
+    """Return whether the spheres around two placed segments are at least `enough_mm` apart."""
+    dx = placed[a, _MIDDLE] - placed[b, _MIDDLE]
+    dy = placed[a, _MIDDLE + 1] - placed[b, _MIDDLE + 1]
+    dz = placed[a, _MIDDLE + 2] - placed[b, _MIDDLE + 2]
+    apart = placed[a, _HALF_LENGTH] + placed[b, _HALF_LENGTH] + enough_mm
+    return bool(dx * dx + dy * dy + dz * dz >= apart * abs(apart))
+
+
+@kernel
+def _sphere_outside(obstacles: FloatArray, i: int, x: float, y: float, z: float, radius: float) -> bool:
+    """Return whether a sphere is outside the box around an obstacle."""
+    dx = max(obstacles[i, LOWER] - x, x - obstacles[i, UPPER], 0.0)
+    dy = max(obstacles[i, LOWER + 1] - y, y - obstacles[i, UPPER + 1], 0.0)
+    dz = max(obstacles[i, LOWER + 2] - z, z - obstacles[i, UPPER + 2], 0.0)
+    outside2 = dx * dx + dy * dy + dz * dz
+    return bool(outside2 > 0.0 and outside2 >= radius * abs(radius))
+
+
+@kernel
+def _body_distance(placed: FloatArray, a: int, b: int) -> float:
+    return segment_distance(
+        placed[a, 0], placed[a, 1], placed[a, 2], placed[a, 3], placed[a, 4], placed[a, 5],
+        placed[b, 0], placed[b, 1], placed[b, 2], placed[b, 3], placed[b, 4], placed[b, 5],
+    )  # fmt: skip
+
+
+@kernel
+def _in_frame(
+    frames: FloatArray, angle: int, i: int, placed: FloatArray, body: int, at: int
+) -> tuple[float, float, float]:
+    """Return a placed body's point, from column `at` on, as obstacle `i` sees it."""
+    x, y, z = placed[body, at], placed[body, at + 1], placed[body, at + 2]
+    return (
+        frames[angle, i, 0, 0] * x + frames[angle, i, 0, 1] * y + frames[angle, i, 0, 2] * z + frames[angle, i, 0, 3],
+        frames[angle, i, 1, 0] * x + frames[angle, i, 1, 1] * y + frames[angle, i, 1, 2] * z + frames[angle, i, 1, 3],
+        frames[angle, i, 2, 0] * x + frames[angle, i, 2, 1] * y + frames[angle, i, 2, 2] * z + frames[angle, i, 2, 3],
+    )
+
+
+@kernel
+def _clearance_of_each(
+    arm: FloatArray, joints: FloatArray, beam_mm: float, pairs: IndexArray, bodies: FloatArray, obstacles: FloatArray,
+    field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
+    obstacle_frames: FloatArray, clearance_mm: FloatArray, pair: IndexArray,
+) -> None:  # fmt: skip
+    frames, placed = np.empty((7, 3, 4)), np.empty((len(bodies), PLACED))
+    for i in range(len(joints)):
+        link_frames(arm, joints[i], frames)
+        place_bodies(bodies, frames, beam_mm, 0, FLANGE_FRAME, placed)
+        clearance_mm[i], pair[i] = nearest_pair(
+            pairs, bodies, obstacles, field_values, field_origin, field_spacing,
+            placed, obstacle_frames, i, 0, len(pairs), np.inf,
+        )  # fmt: skip

@@ -1,0 +1,203 @@
+"""The predefined scanning patterns of Fig. 2, as waypoints of the probe over an idealised workpiece.
+
+Each pattern is drawn as corners in two or more coordinates of the surface (such as azimuth and height), filled in
+between, and laid onto the surface. Neighbouring strips lie line width x (1 - overlap) apart.
+
+| Fig. 2 | class    | patterns                                                  |
+|--------|----------|-----------------------------------------------------------|
+| (a)    | sphere   | meridians (zigzag), spiral                                |
+| (b)    | cylinder | rings, helix; the line lies along the axis                |
+| (c)    | mould    | raster (zigzag from above)                                |
+| (d)    | mould    | crossed (two rasters), tilted (strips seen from two sides) |
+"""
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.cell.cell import Probe
+from planner.cell.scan_path import looking_at
+from planner.cell.workpiece import Cylinder, Mould, Sphere
+
+# Distance of the waypoints filled in between corners, in mm or in degrees of the coordinate that moves most.
+_SPACING = 2.0
+
+
+@dataclass(frozen=True)
+class StripLayout:
+    """How the strips of a pattern lie.
+
+    Attributes:
+        overlap: Share of the line's width that a strip has in common with its neighbour.
+        top_polar_deg: Where a sphere's strips begin, as an angle from its pole.
+        lowest_polar_deg: Where a sphere's strips end: below its equator the table is in the way.
+        bottom_margin_mm: Least height of the line's middle over the base of a cylinder.
+        wall_margin_mm: How far from a mould's walls its strips end, so that the beam passes the wall.
+        tilt_deg: How far `tilted` leans the beam to see the walls.
+    """
+
+    overlap: float = 0.2
+    top_polar_deg: float = 10.0
+    lowest_polar_deg: float = 90.0
+    bottom_margin_mm: float = 40.0
+    wall_margin_mm: float = 15.0
+    tilt_deg: float = 25.0
+
+    def pitch_mm(self, line_width_mm: float) -> float:
+        """Return the distance of neighbouring strips."""
+        return line_width_mm * (1.0 - self.overlap)
+
+    def strip_centres(self, span_mm: float, line_width_mm: float) -> FloatArray:
+        """Return the evenly spread middles of the fewest strips that cover a span about 0."""
+        beyond = max(0.0, span_mm - line_width_mm)
+        count = 1 + math.ceil(beyond / self.pitch_mm(line_width_mm) - 1e-9)
+        return np.linspace(-0.5 * beyond, 0.5 * beyond, count) if count > 1 else np.zeros(1)
+
+
+def sphere_meridians(sphere: Sphere, probe: Probe, layout: StripLayout) -> FloatArray:
+    """Return a zigzag down one meridian and up the next, the line across the meridian."""
+    radius = 0.5 * sphere.diameter_mm
+    count = math.ceil(2.0 * math.pi * radius / layout.pitch_mm(probe.line_width_mm))
+    ends = (layout.top_polar_deg, layout.lowest_polar_deg)
+    corners = [
+        (polar, 360.0 * strip / count) for strip in range(count) for polar in (ends if strip % 2 == 0 else ends[::-1])
+    ]
+    polar, azimuth = np.radians(_filled(corners).T)
+    across = np.column_stack((-np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)))
+    return _on_sphere(sphere, probe, polar, azimuth, across)
+
+
+def sphere_spiral(sphere: Sphere, probe: Probe, layout: StripLayout) -> FloatArray:
+    """Return a spiral from the pole down that sinks one strip per turn, the line along the meridian.
+
+    It begins and ends in a full turn at one polar angle, or else a wedge at either end would be left out.
+    """
+    turn_deg = math.degrees(layout.pitch_mm(probe.line_width_mm) / (0.5 * sphere.diameter_mm))
+    top, lowest = layout.top_polar_deg, layout.lowest_polar_deg
+    turns = (lowest - top) / turn_deg
+    corners = [(top, 0.0), (top, 360.0), (lowest, 360.0 * (turns + 1.0)), (lowest, 360.0 * (turns + 2.0))]
+    polar, azimuth = np.radians(_filled(corners).T)
+    down = np.column_stack((np.cos(polar) * np.cos(azimuth), np.cos(polar) * np.sin(azimuth), -np.sin(polar)))
+    return _on_sphere(sphere, probe, polar, azimuth, down)
+
+
+def _on_sphere(sphere: Sphere, probe: Probe, polar: FloatArray, azimuth: FloatArray, lines: FloatArray) -> FloatArray:
+    normals = np.column_stack((np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)))
+    radius = 0.5 * sphere.diameter_mm
+    points = np.add(sphere.middle_mm, (0.0, 0.0, radius)) + radius * normals
+    return looking_at(points, normals, lines, probe.stand_off_mm)
+
+
+def cylinder_rings(cylinder: Cylinder, probe: Probe, layout: StripLayout) -> FloatArray:
+    """Return full turns at one height each, from the bottom up, without turning back."""
+    heights = _ring_heights(cylinder, probe, layout)
+    corners = [(360.0 * (ring + end), height) for ring, height in enumerate(heights) for end in (0.0, 1.0)]
+    return _on_cylinder(cylinder, probe, corners)
+
+
+def cylinder_helix(cylinder: Cylinder, probe: Probe, layout: StripLayout) -> FloatArray:
+    """Return a helix from the bottom up that climbs one strip per turn.
+
+    It begins and ends in a full turn at one height, or else a wedge at either end would be left out.
+    """
+    heights = _ring_heights(cylinder, probe, layout)
+    bottom, top, turns = heights[0], heights[-1], len(heights) - 1
+    return _on_cylinder(
+        cylinder, probe, [(0.0, bottom), (360.0, bottom), (360.0 * (turns + 1), top), (360.0 * (turns + 2), top)]
+    )
+
+
+def _ring_heights(cylinder: Cylinder, probe: Probe, layout: StripLayout) -> FloatArray:
+    bottom = min(layout.bottom_margin_mm, 0.5 * cylinder.height_mm)
+    lower = max(0.0, bottom - 0.5 * probe.line_width_mm)
+    middles = layout.strip_centres(cylinder.height_mm - lower, probe.line_width_mm)
+    return middles + 0.5 * (cylinder.height_mm + lower)
+
+
+def _on_cylinder(cylinder: Cylinder, probe: Probe, corners: list[tuple[float, float]]) -> FloatArray:
+    azimuth_deg, height = _filled(corners).T
+    azimuth = np.radians(azimuth_deg)
+    normals = np.column_stack((np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)))
+    points = 0.5 * cylinder.diameter_mm * normals + cylinder.middle_mm
+    points[:, 2] += height
+    lines = np.tile((0.0, 0.0, 1.0), (len(points), 1))
+    return looking_at(points, normals, lines, probe.stand_off_mm)
+
+
+def mould_raster(mould: Mould, probe: Probe, layout: StripLayout) -> FloatArray:
+    """Return a zigzag of strips along the cavity's length, seen from straight above."""
+    return _on_mould(mould, probe, _strips(mould, probe, layout))
+
+
+def mould_crossed(mould: Mould, probe: Probe, layout: StripLayout) -> FloatArray:
+    """Return the raster along the length, then one across it with the line turned by 90 degrees."""
+    across = Mould(
+        mould.width_mm,
+        mould.length_mm,
+        mould.height_mm,
+        mould.cavity_width_mm,
+        mould.cavity_length_mm,
+        mould.cavity_depth_mm,
+    )
+    along = _strips(mould, probe, layout)
+    crossing = [(-y, x, 90.0, tilt) for x, y, _, tilt in _strips(across, probe, layout)]
+    return _on_mould(mould, probe, along + _from_nearer_end(crossing, along[-1]))
+
+
+def mould_tilted(mould: Mould, probe: Probe, layout: StripLayout) -> FloatArray:
+    """Return the raster with the beam leaning to one side of the travel, then back with it leaning to the other."""
+    strips = _strips(mould, probe, layout)
+    leaning = [(x, y, turn, layout.tilt_deg) for x, y, turn, _ in strips]
+    back = [(x, y, turn, -layout.tilt_deg) for x, y, turn, _ in reversed(strips)]
+    return _on_mould(mould, probe, leaning + back)
+
+
+MouldCorner = tuple[float, float, float, float]
+"""Where on the cavity's floor (x, y in mm), how far the line is turned about z and the beam tilted across it (deg)."""
+
+
+def _strips(mould: Mould, probe: Probe, layout: StripLayout) -> list[MouldCorner]:
+    end = max(0.0, 0.5 * mould.cavity_length_mm - layout.wall_margin_mm)
+    ends = (-end, end)
+    middles = layout.strip_centres(mould.cavity_width_mm, probe.line_width_mm)
+    return [
+        (x, float(y), 0.0, 0.0) for strip, y in enumerate(middles) for x in (ends if strip % 2 == 0 else ends[::-1])
+    ]
+
+
+def _from_nearer_end(corners: list[MouldCorner], start: MouldCorner) -> list[MouldCorner]:
+    first, last = (math.dist(corners[end][:2], start[:2]) for end in (0, -1))
+    return corners if first <= last else corners[::-1]
+
+
+def _on_mould(mould: Mould, probe: Probe, corners: list[MouldCorner]) -> FloatArray:
+    x, y, turn_deg, tilt_deg = _filled(corners).T
+    turn, tilt = np.radians(turn_deg), np.radians(tilt_deg)
+    # Untilted and unturned, the strip runs along x and the line lies along y.
+    lines = np.column_stack((-np.sin(turn), np.cos(turn), np.zeros_like(turn)))
+    normals = np.sin(tilt)[:, np.newaxis] * lines + np.cos(tilt)[:, np.newaxis] * np.array([0.0, 0.0, 1.0])
+    floor = np.full_like(x, mould.height_mm - mould.cavity_depth_mm)
+    points = np.column_stack((x, y, floor)) + mould.middle_mm
+    return looking_at(points, normals, lines, probe.stand_off_mm)
+
+
+PATTERNS: dict[str, dict[str, Callable[..., FloatArray]]] = {
+    "cylinder": {"helix": cylinder_helix, "rings": cylinder_rings},
+    "mould": {"crossed": mould_crossed, "raster": mould_raster, "tilted": mould_tilted},
+    "sphere": {"meridians": sphere_meridians, "spiral": sphere_spiral},
+}
+"""The patterns of each workpiece class, by name; all take the workpiece, the probe and the layout."""
+
+
+def _filled(corners: list[tuple[float, ...]] | list[MouldCorner] | list[tuple[float, float]]) -> FloatArray:
+    """Return the corners with evenly spaced points between them, `(n, number of coordinates)`."""
+    pieces = [np.array(corners[:1], dtype=np.float64)]
+    for start, end in itertools.pairwise(corners):
+        longest = max(abs(b - a) for a, b in zip(start, end, strict=True))
+        steps = max(1, math.ceil(longest / _SPACING))
+        pieces.append(np.linspace(start, end, steps + 1)[1:])
+    return np.concatenate(pieces)

@@ -1,0 +1,240 @@
+"""A scan problem: cell, workpiece, path, limits and weights, read from one TOML file.
+
+Keys carry their units; placements are x y z in mm and yaw pitch roll in degrees. Files named in a scan file are
+looked for beside it.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from planner.arrays import FloatArray
+from planner.cell.bodies import Bodies, load_bodies
+from planner.cell.cell import Cell, Probe, Table, placement
+from planner.cell.patterns import PATTERNS, StripLayout
+from planner.cell.scan_path import ScanPath, at_scan_speed, load_scan_path
+from planner.cell.workpiece import CLASSES, Workpiece
+from planner.errors import PlannerError, ScanFileError, WorkpieceError
+from planner.geometry.mesh import load_mesh, radius_about_axis_mm, size_fault
+from planner.kinematics.arm import Arm
+from planner.kinematics.value import ValueFunction
+from planner.table.cost import Weights, default_weights
+from planner.table.motion import Limits
+from planner.toml_table import TomlTable
+
+_SHIPPED = Path(__file__).parents[1] / "scans"
+# A workpiece may touch the table, and a mesh's base need not be ground flat.
+_BASE_TOLERANCE_MM = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Everything that a configuration map and a plan need.
+
+    Attributes:
+        name: The scan file's name without its ending.
+        cell: Arm, table and probe.
+        bodies: What moves with the arm and must not collide.
+        workpiece: The workpiece's class and dimensions; None for a mesh of no class.
+        mesh: The workpiece's closed surface in frame W, mm.
+        mesh_file: Where that surface was read; None where it follows from the dimensions.
+        path: Where the probe must be.
+        value: What makes a pose good.
+        limits: The table's limits.
+        weights: Weights of the table's motion.
+    """
+
+    name: str
+    cell: Cell
+    bodies: Bodies = field(repr=False)
+    workpiece: Workpiece | None
+    mesh: trimesh.Trimesh = field(repr=False)
+    mesh_file: Path | None
+    path: ScanPath = field(repr=False)
+    value: ValueFunction
+    limits: Limits
+    weights: Weights
+
+
+def shipped_scans() -> list[str]:
+    """Return the names of the scans that come with the planner."""
+    return sorted(file.stem for file in _SHIPPED.glob("*.toml"))
+
+
+def load_scan(scan: str | Path) -> Scan:
+    """Return the scan of a TOML file, or a shipped one by its name.
+
+    Raises:
+        PlannerError: A file cannot be read, or holds a key, value or shape that is not allowed; the message names it.
+    """
+    shipped = _SHIPPED / f"{scan}.toml"
+    file = shipped if shipped.is_file() else Path(scan)
+    if not file.is_file():
+        raise ScanFileError(f"{scan} is neither a scan file nor one of the shipped scans {', '.join(shipped_scans())}")
+    top = TomlTable.load(file)
+    with _named(file):
+        cell, bodies = _read_cell(top.table("cell"), file.parent)
+        workpiece, mesh, mesh_file = _read_workpiece(top.table("workpiece"), file.parent)
+        _check_it_fits_the_table(mesh, cell)
+        path = _read_path(top.table("path"), file.parent, cell.probe, workpiece)
+        value = ValueFunction.read(top.table("value"))
+        limits = _read_limits(top.table("limits"))
+        weights = _read_weights(top.table("weights"), limits)
+    top.finish()
+    return Scan(file.stem, cell, bodies, workpiece, mesh, mesh_file, path, value, limits, weights)
+
+
+def with_mesh(scan: Scan, file: Path) -> Scan:
+    """Return the scan with the workpiece of another file in the place of its own.
+
+    Raises:
+        WorkpieceError: The mesh cannot be a workpiece, or does not fit the table.
+    """
+    mesh = load_mesh(file)
+    with _named(file):
+        _check_it_fits_the_table(mesh, scan.cell)
+    return replace(scan, workpiece=None, mesh=mesh, mesh_file=file)
+
+
+@contextmanager
+def _named(file: Path) -> Iterator[None]:
+    """Put the file's name before messages that do not know it."""
+    try:
+        yield
+    except ScanFileError:
+        raise
+    except PlannerError as error:
+        raise type(error)(f"{file}: {error}") from error
+
+
+def _read_cell(section: TomlTable, folder: Path) -> tuple[Cell, Bodies]:
+    arm = Arm.load(_beside(folder, section.text("arm", "viper_s650")))
+    bodies_file = _beside(folder, section.text("bodies", "viper_s650"))
+    placed = {
+        name: _placement(section, key)
+        for name, key in (("T_BT", "table_in_base"), ("T_TW", "workpiece_on_table"), ("T_FS", "probe_on_flange"))
+        if key in section
+    }
+    table, probe = _read_table(section.table("table")), _read_probe(section.table("probe"))
+    section.finish()
+    cell = Cell(arm=arm, table=table, probe=probe, **placed)
+    return cell, load_bodies(probe, cell.T_FS, bodies_file)
+
+
+def _beside(folder: Path, name: str) -> Path | str:
+    """Return the file of that name in the scan file's folder, else the name: that of a shipped one."""
+    return folder / name if (folder / name).is_file() else name
+
+
+def _placement(section: TomlTable, key: str) -> FloatArray:
+    return placement(*section.numbers(key, 6))
+
+
+def _read_table(section: TomlTable) -> Table:
+    table = Table(
+        **{item.name: section.number(item.name, getattr(Table, item.name), above=0.0) for item in fields(Table)}
+    )
+    section.finish()
+    return table
+
+
+def _read_probe(section: TomlTable) -> Probe:
+    nearest = section.number("nearest_mm", Probe.nearest_mm, above=0.0)
+    farthest = section.number("farthest_mm", Probe.farthest_mm, above=nearest)
+    x, y, z = section.numbers("body_mm", 3, Probe.body_mm)
+    if min(x, y, z) <= 0.0:
+        raise section.refuse("body_mm", "three numbers above 0")
+    probe = Probe(
+        stand_off_mm=section.number("stand_off_mm", Probe.stand_off_mm, at_least=nearest, at_most=farthest),
+        nearest_mm=nearest,
+        farthest_mm=farthest,
+        line_width_mm=section.number("line_width_mm", Probe.line_width_mm, above=0.0),
+        body_mm=(x, y, z),
+    )
+    section.finish()
+    return probe
+
+
+def _read_workpiece(section: TomlTable, folder: Path) -> tuple[Workpiece | None, trimesh.Trimesh, Path | None]:
+    if "mesh" in section:
+        mesh_file = folder / section.text("mesh")
+        kind = section.choice("class", (*CLASSES, "other"), "other")
+        section.finish()
+        mesh = load_mesh(mesh_file)
+        return (CLASSES[kind].measured(mesh) if kind != "other" else None), mesh, mesh_file
+    shape = CLASSES[section.choice("class", tuple(CLASSES))]
+    names = [item.name for item in fields(shape) if item.name != "middle_mm"]
+    workpiece = shape(middle_mm=(0.0, 0.0, 0.0), **{name: section.number(name, above=0.0) for name in names})
+    section.finish()
+    mesh = workpiece.mesh()
+    fault = size_fault(mesh)
+    if fault is not None:
+        raise WorkpieceError(fault)
+    return workpiece, mesh, None
+
+
+def _check_it_fits_the_table(mesh: trimesh.Trimesh, cell: Cell) -> None:
+    reach_mm = radius_about_axis_mm(mesh, cell.T_TW)
+    if reach_mm > cell.table.radius_mm:
+        raise WorkpieceError(
+            f"the workpiece reaches {reach_mm:.1f} mm from the table's axis;"
+            f" it must stay within the table's radius of {cell.table.radius_mm:g} mm"
+        )
+    lowest_mm = float((np.asarray(mesh.vertices) @ cell.T_TW[2, :3]).min() + cell.T_TW[2, 3])
+    if lowest_mm < -_BASE_TOLERANCE_MM:
+        raise WorkpieceError(f"the workpiece reaches {-lowest_mm:.1f} mm below the table's top; it must stand on it")
+
+
+def _read_path(section: TomlTable, folder: Path, probe: Probe, workpiece: Workpiece | None) -> ScanPath:
+    step_s = section.number("time_step_s", above=0.0)
+    if "file" in section:
+        file = folder / section.text("file")
+        section.finish()
+        return load_scan_path(file, step_s)
+    if workpiece is None:
+        raise section.refuse("file", "a path file, because the workpiece has no class with predefined patterns")
+    patterns = PATTERNS[type(workpiece).__name__.lower()]
+    pattern = patterns[section.choice("pattern", tuple(patterns))]
+    speed_mm_s = section.number("scan_speed_mm_s", above=0.0)
+    layout = _read_layout(section)
+    section.finish()
+    waypoints = pattern(workpiece, probe, layout)
+    return at_scan_speed(waypoints, speed_mm_s, step_s, probe.stand_off_mm, probe.line_width_mm)
+
+
+def _read_layout(section: TomlTable) -> StripLayout:
+    top_polar_deg = section.number("top_polar_deg", StripLayout.top_polar_deg, at_least=0.0, at_most=170.0)
+    return StripLayout(
+        overlap=section.number("overlap", StripLayout.overlap, at_least=0.0, at_most=0.9),
+        top_polar_deg=top_polar_deg,
+        lowest_polar_deg=section.number(
+            "lowest_polar_deg", StripLayout.lowest_polar_deg, above=top_polar_deg, at_most=180.0
+        ),
+        bottom_margin_mm=section.number("bottom_margin_mm", StripLayout.bottom_margin_mm, at_least=0.0),
+        wall_margin_mm=section.number("wall_margin_mm", StripLayout.wall_margin_mm, at_least=0.0),
+        tilt_deg=section.number("tilt_deg", StripLayout.tilt_deg, at_least=0.0, at_most=60.0),
+    )
+
+
+def _read_limits(section: TomlTable) -> Limits:
+    default = Limits()
+    limits = Limits(
+        speed_deg_s=section.number("table_speed_deg_s", default.speed_deg_s, above=0.0),
+        acceleration_deg_s2=section.number("table_acceleration_deg_s2", default.acceleration_deg_s2, above=0.0),
+    )
+    section.finish()
+    return limits
+
+
+def _read_weights(section: TomlTable, limits: Limits) -> Weights:
+    default = default_weights(limits)
+    weights = Weights(
+        acceleration=section.number("k_a", default.acceleration, at_least=0.0),
+        speed=section.number("k_w", default.speed, at_least=0.0),
+    )
+    section.finish()
+    return weights

@@ -1,0 +1,157 @@
+"""A scan path: where the probe must be, as one pose per location in the workpiece frame, at a constant time step."""
+
+import csv
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from planner.arrays import FloatArray
+from planner.errors import PathError
+from planner.geometry.transforms import first_not_rigid, from_xyz_yaw_pitch_roll, nearest_rigid
+
+
+@dataclass(frozen=True, eq=False)
+class ScanPath:
+    """Scan locations and the time between two of them.
+
+    Attributes:
+        T_WS: Probe poses in the workpiece frame, T_L in the paper, `(n, 4, 4)` in mm.
+        step_s: Time from one location to the next.
+
+    Raises:
+        PathError: Fewer than two locations, one that is not rigid, or a step that is not above 0.
+    """
+
+    T_WS: FloatArray
+    step_s: float
+
+    def __post_init__(self) -> None:
+        if len(self.T_WS) < 2:
+            raise PathError(f"the path has {len(self.T_WS)} location(s); it must have at least 2")
+        if not 0.0 < self.step_s < np.inf:
+            raise PathError(f"the path's time step is {self.step_s:g} s; it must be above 0")
+        fault = first_not_rigid(self.T_WS)
+        if fault is not None:
+            raise PathError(f"location {fault[0] + 1} of the path {fault[1]}")
+
+    @property
+    def count(self) -> int:
+        """The number of locations."""
+        return len(self.T_WS)
+
+
+def looking_at(points: FloatArray, normals: FloatArray, lines: FloatArray, stand_off_mm: float) -> FloatArray:
+    """Return probe poses `(n, 4, 4)` at p + stand-off n that look along -n.
+
+    Args:
+        points: Surface points p, `(n, 3)` in mm.
+        normals: Unit normals n that point out of the surface, `(n, 3)`.
+        lines: Directions of the laser line, `(n, 3)`; only the part across the normal counts.
+        stand_off_mm: Distance of the probe from p.
+    """
+    T = np.tile(np.eye(4), (len(points), 1, 1))
+    beam = -normals
+    along = lines - np.sum(lines * beam, axis=1, keepdims=True) * beam
+    T[:, :3, 0] = along / np.linalg.norm(along, axis=1, keepdims=True)
+    T[:, :3, 1] = np.cross(beam, T[:, :3, 0])
+    T[:, :3, 2] = beam
+    T[:, :3, 3] = points + stand_off_mm * normals
+    return T
+
+
+def at_scan_speed(
+    waypoints: FloatArray, speed_mm_s: float, step_s: float, stand_off_mm: float, line_width_mm: float
+) -> ScanPath:
+    """Return the path through `waypoints` `(n, 4, 4)` whose line moves over the surface at one speed.
+
+    The speed is that of the fastest of the line's middle and ends, so that a turn on the spot takes its time too.
+    All steps are equal and the last one ends at the last waypoint: for that the speed gives way, by less than half a
+    step over the whole path.
+    """
+    line = 0.5 * line_width_mm
+    marks = np.array([[-line, 0, stand_off_mm, 1], [0, 0, stand_off_mm, 1], [line, 0, stand_off_mm, 1]])
+    on_surface = (waypoints @ marks.T)[:, :3]
+    lengths = np.linalg.norm(np.diff(on_surface, axis=0), axis=1).max(axis=1)
+    moving = np.concatenate(([True], lengths > 1e-9))
+    waypoints, travelled = waypoints[moving], np.concatenate(([0.0], np.cumsum(lengths)))[moving]
+    count = max(2, 1 + round(travelled[-1] / (speed_mm_s * step_s)))
+    if len(waypoints) < 2:
+        raise PathError("the path does not move; it must have at least 2 different locations")
+    at = np.linspace(0.0, travelled[-1], count)
+    T = np.tile(np.eye(4), (count, 1, 1))
+    T[:, :3, :3] = Slerp(travelled, Rotation.from_matrix(waypoints[:, :3, :3]))(at).as_matrix()
+    for axis in range(3):
+        T[:, axis, 3] = np.interp(at, travelled, waypoints[:, axis, 3])
+    return ScanPath(T, step_s)
+
+
+def load_scan_path(file: Path, step_s: float) -> ScanPath:
+    """Return the path of a CSV or JSON file of poses.
+
+    A pose is six numbers, x y z in mm and yaw pitch roll in degrees, or the sixteen of a 4 x 4 matrix by rows. A CSV
+    file has one pose a line, after an optional line of headings. A JSON file is a list of poses, where a matrix may
+    also be a list of its rows.
+
+    Raises:
+        PathError: The file cannot be read, or a pose is not six or sixteen finite numbers, or not rigid.
+    """
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise PathError(f"{file}: cannot be read ({error})") from error
+    if file.suffix.lower() == ".json":
+        rows = _rows_of_json(file, text)
+    elif file.suffix.lower() == ".csv":
+        rows = _rows_of_csv(file, text)
+    else:
+        raise PathError(f"{file}: a path file must end in .csv or .json")
+    poses = [_pose(f"{file}: pose {i}", row) for i, row in enumerate(rows, 1)]
+    try:
+        return ScanPath(np.array(poses).reshape(-1, 4, 4), step_s)
+    except PathError as error:
+        raise PathError(f"{file}: {error}") from error
+
+
+def _rows_of_csv(file: Path, text: str) -> list[list[float]]:
+    rows: list[list[float]] = []
+    for number, row in enumerate(csv.reader(text.splitlines()), 1):
+        if not any(cell.strip() for cell in row):
+            continue
+        try:
+            rows.append([float(cell) for cell in row])
+        except ValueError:
+            if number > 1:
+                raise PathError(f"{file}: line {number} holds {','.join(row)!r}; numbers only are allowed") from None
+    return rows
+
+
+def _rows_of_json(file: Path, text: str) -> list[list[float]]:
+    try:
+        poses = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise PathError(f"{file}: not a JSON file: {error}") from error
+    if not isinstance(poses, list):
+        raise PathError(f"{file}: must hold a list of poses")
+    try:
+        return [np.asarray(one, dtype=np.float64).ravel().tolist() for one in poses]
+    except (TypeError, ValueError):
+        raise PathError(f"{file}: each pose must be 6 numbers, or a 4 x 4 matrix of numbers") from None
+
+
+def _pose(where: str, row: list[float]) -> FloatArray:
+    if len(row) not in (6, 16):
+        raise PathError(
+            f"{where} has {len(row)} numbers; allowed are 6 (x y z yaw pitch roll) or the 16 of a 4 x 4 matrix"
+        )
+    if not np.isfinite(row).all():
+        raise PathError(f"{where} holds a value that is not a finite number")
+    if len(row) == 6:
+        return np.asarray(from_xyz_yaw_pitch_roll(np.array([row]))[0])
+    T = np.array(row).reshape(1, 4, 4)
+    fault = first_not_rigid(T)
+    if fault is not None:
+        raise PathError(f"{where} {fault[1]}")
+    return np.asarray(nearest_rigid(T)[0])

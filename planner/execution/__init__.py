@@ -1,0 +1,1 @@
+"""A plan on the table: streamed, watched, corrected, verified and recorded."""

@@ -1,0 +1,198 @@
+"""Run a motion on the table at a port: send each command in time, and stop the table when something goes wrong.
+
+One code path for a pty, TCP, a serial device and simulated time: the clock comes from the port. What is sent is
+`stream_correction`'s, what is seen between two commands `table_watch`'s. The record of both is complete whatever
+happens.
+"""
+
+from contextlib import suppress
+from typing import NamedTuple
+
+from planner.errors import PlannerError
+from planner.execution.inside_view import InsideView
+from planner.execution.run_record import Record, Sent
+from planner.execution.stream import TimedCommand
+from planner.execution.stream_correction import CorrectedStream
+from planner.execution.table_motion import TableMotion
+from planner.execution.table_watch import StrayedError, TableWatch
+from planner.progress import Progress
+from planner.table.motion import Limits
+from planner.table.velocity_profile import MotionCommand, ReferenceState, time_to_rest_s
+from planner.table.wire import Grid, Wire, command_line, exchanges_s
+from protocol import ArrivalTimeout, CommandRefused, TableClient, TableError, Verb
+
+# Between the last reading and the next command: what the operating system may take.
+_SLACK_S = 0.005
+# From the call to the first command, beside what its lines take.
+_PREPARATION_S = 0.1
+# As long as any command: what its lines take at most.
+_ANY_COMMAND = MotionCommand(-100.0, 10.0, 10.0)
+
+
+class ExecutionError(TableError):
+    """The table cannot do what the plan asks."""
+
+
+class Settings(NamedTuple):
+    """How a motion is run.
+
+    Attributes:
+        lag_s: how long after the reference the encoder is at the same angle; the default is that of the stand-in's
+            speed loop.
+        lead_s: how long before their time the commands take effect. With the lag, the encoder is in time; with 0, the
+            reference is.
+        tolerance_deg: how far the encoder may be from the plan before the table is stopped.
+        drift_deg: how far the reference may be from where it was expected before the rest is streamed anew.
+        drift_filter_s: over how long readings are averaged for that.
+        poll_s: from one reading of the position to the next, at least.
+        look_s: the same for looks from inside.
+    """
+
+    lag_s: float = 0.0035
+    lead_s: float = 0.0
+    tolerance_deg: float = 1.0
+    drift_deg: float = 0.15
+    drift_filter_s: float = 3.0
+    poll_s: float = 0.05
+    look_s: float = 0.02
+
+    @property
+    def encoder_delay_s(self) -> float:
+        """How long after its time in the plan the encoder is at an angle."""
+        return self.lag_s - self.lead_s
+
+
+def execute(
+    table: TableClient,
+    motion: TableMotion,
+    limits: Limits,
+    wire: Wire,
+    settings: Settings | None = None,
+    view: InsideView | None = None,
+    progress: Progress | None = None,
+) -> Record:
+    """Run a motion on a table that stands at its start, and return what happened.
+
+    Whatever goes wrong, and Ctrl-C, stops the table and is named in the record.
+
+    Args:
+        table: the client at the table's port.
+        motion: what the table should do.
+        limits: greatest S and A.
+        wire: what its commands have to pass.
+        settings: how it is run.
+        view: a way to look into the table, where there is one; then it also gets its triggers from here.
+        progress: called with the time of the motion and its end, in ms.
+
+    Raises:
+        StreamError: the commands follow one another faster than the wire carries them; nothing was sent.
+    """
+    settings = settings or Settings()
+    commands = CorrectedStream(
+        motion, limits, wire, settings.drift_deg, settings.drift_filter_s, settings.encoder_delay_s
+    )
+    # The first command's S and A are to be sent in peace.
+    preparation_s = 4.0 * exchanges_s(wire, _ANY_COMMAND)
+    origin_s = table.clock.now_s() - motion.start_s + settings.lead_s + preparation_s + _PREPARATION_S
+    record = Record(corrections=commands.corrections, origin_s=origin_s)
+    watch = TableWatch(
+        table, motion, wire, record, settings.tolerance_deg, settings.poll_s, settings.look_s, view, progress
+    )
+    is_done = False
+    try:
+        _Run(table, wire, commands, watch, record, settings.lead_s).go(motion)
+        is_done = True
+    except (TableError, PlannerError) as error:
+        record.failure = str(error)
+        record.has_strayed = isinstance(error, StrayedError | ArrivalTimeout)
+    except KeyboardInterrupt:
+        record.failure = "interrupted"
+    finally:
+        if not is_done:
+            with suppress(TableError):
+                table.stop()
+        if progress is not None:
+            progress(1, 1)
+    return record
+
+
+def bring_to(table: TableClient, angle_deg: float, limits: Limits, wire: Wire, tolerance_deg: float = 0.1) -> None:
+    """Move the table to an angle at the limits, and wait until it stands there.
+
+    Raises:
+        TableError: the table did not get there; it was stopped.
+    """
+    way = Grid(limits, wire).command(MotionCommand(angle_deg, *limits))
+    needed_s = time_to_rest_s(ReferenceState(table.position_deg(), 0.0), way)
+    try:
+        table.set_speed(way.speed_deg_s)
+        table.set_acceleration(way.acceleration_deg_s2)
+    except CommandRefused as error:
+        raise ExecutionError(
+            f"this table refuses the plan's limits, {limits.speed_deg_s:g} deg/s and"
+            f" {limits.acceleration_deg_s2:g} deg/s2; plan within this table's own limits"
+        ) from error
+    try:
+        table.move_to(way.target_deg)
+        table.wait_until_at(way.target_deg, tolerance_deg, 2.0 * needed_s + 3.0)
+    except (TableError, KeyboardInterrupt):
+        with suppress(TableError):
+            table.stop()
+        raise
+
+
+class _Run:
+    """The commands of one motion under way, each sent so that it takes effect in time."""
+
+    def __init__(
+        self,
+        table: TableClient,
+        wire: Wire,
+        commands: CorrectedStream,
+        watch: TableWatch,
+        record: Record,
+        lead_s: float,
+    ) -> None:
+        self._table, self._wire, self._commands = table, wire, commands
+        self._watch, self._record, self._lead_s = watch, record, lead_s
+        self._latched: MotionCommand | None = None
+
+    def go(self, motion: TableMotion) -> None:
+        """Send all commands in their time, then wait until the table stands."""
+        while (timed := self._commands.next()) is not None:
+            self._send(timed)
+            following = self._commands.following
+            until_s = motion.end_s if following is None else self._prepare_s(following)
+            self._watch.read_until(until_s, self._commands.encoder_read)
+        self._watch.wait_for_rest(self._latched.target_deg if self._latched else motion.start_deg)
+
+    def _send(self, timed: TimedCommand) -> None:
+        """Send A and S where they change, and P so that its CR arrives in time."""
+        command, before = timed.command, self._latched
+        if before is None or command.acceleration_deg_s2 != before.acceleration_deg_s2:
+            self._table.set_acceleration(command.acceleration_deg_s2)
+        if before is None or command.speed_deg_s != before.speed_deg_s:
+            self._table.set_speed(command.speed_deg_s)
+        self._latched = command
+        line = command_line(Verb.MOVE_TO, command.target_deg, self._wire)
+        under_way_s = self._wire.seconds(len(line)) + self._wire.latency_s
+        due_s = timed.time_s - self._lead_s - under_way_s
+        self._watch.sleep_until(due_s)
+        late_s = self._watch.now_s() - due_s
+        self._check_lateness(timed, late_s)
+        self._table.move_to(command.target_deg)
+        self._commands.sent(timed, late_s)
+        self._record.sent.append(Sent(timed.time_s, late_s, timed.leg.phase, timed.leg.column, command))
+
+    def _check_lateness(self, timed: TimedCommand, late_s: float) -> None:
+        allowed_s = self._commands.latest_s(timed)
+        if late_s > allowed_s:
+            raise ExecutionError(
+                f"the command of location {timed.leg.column} would have come {late_s:.2f} s late, more than"
+                f" {allowed_s:g} s: the table or this machine answers too slowly"
+            )
+
+    def _prepare_s(self, timed: TimedCommand) -> float:
+        """Return when the lines of a command have to begin."""
+        needed_s = exchanges_s(self._wire, timed.command, self._latched) + self._wire.latency_s + _SLACK_S
+        return timed.time_s - self._lead_s - needed_s

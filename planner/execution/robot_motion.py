@@ -1,0 +1,48 @@
+"""The robot's side of a run: the arm's joints at the times of the table's motion."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.execution.table_motion import Phase, TableMotion
+
+
+class RobotMotion(NamedTuple):
+    """The joint path in time; between two samples the joints move in proportion.
+
+    Attributes:
+        times_s: (m,) ascending, in the time of the table's motion.
+        joints_deg: (m, 6).
+        columns: (m,) the scan location that each sample belongs to.
+        phases: (m,) what goes on from there: in a pause the robot draws the probe back along its beam and turns to the
+            joints of the next location; how is its own program's business.
+    """
+
+    times_s: FloatArray
+    joints_deg: FloatArray
+    columns: tuple[int, ...]
+    phases: tuple[Phase, ...]
+
+    def joints_at(self, time_s: float) -> FloatArray:
+        """Return the (6,) joints at a time: what an ideal robot latches at a trigger."""
+        return np.array([np.interp(time_s, self.times_s, self.joints_deg[:, j]) for j in range(6)])
+
+
+def robot_motion(motion: TableMotion, joints_deg: FloatArray) -> RobotMotion:
+    """Return the joint path of a run.
+
+    Args:
+        motion: the table's motion.
+        joints_deg: (n + 1, 6) the arm's joints at each scan location.
+    """
+    samples = [(0.0, 0, Phase.SCAN)]
+    for leg in motion.legs:
+        if leg.phase is Phase.SCAN or leg.phase is Phase.APPROACH:
+            samples.append((leg.end_s, leg.column + 1, Phase.SCAN))
+        elif leg.phase is Phase.RETRACT:
+            samples[-1] = (leg.start_s, leg.column, Phase.RETRACT)
+        elif leg.phase is Phase.ROTATE:
+            samples += [(leg.start_s, leg.column, Phase.ROTATE), (leg.end_s, leg.column + 1, Phase.APPROACH)]
+    times, columns, phases = zip(*samples, strict=True)
+    return RobotMotion(np.array(times), joints_deg[list(columns)], columns, phases)

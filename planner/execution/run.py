@@ -1,0 +1,112 @@
+"""A plan file carried out and verified, from the check before the first byte to the files that tell of it."""
+
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import NamedTuple
+
+from planner.execution.execute import Settings, bring_to, execute
+from planner.execution.free_way import check_ends, nearest_turns, turns_to_start
+from planner.execution.inside_view import ControlView, InsideView, view_of
+from planner.execution.robot_motion import robot_motion
+from planner.execution.run_file import RunConditions, StoredRun, copy_input, save_robot, save_run
+from planner.execution.run_input import RunInput, load_run_input
+from planner.execution.run_plots import plot_run
+from planner.execution.run_verification import DEFAULT_TOLERANCE_DEG, RunVerification, verify_run
+from planner.execution.stream import check_it_fits, stream
+from planner.execution.table_motion import PauseTimes, TableMotion
+from planner.execution.table_port import open_port
+from planner.map.map_file import MAP_FILE
+from planner.progress import Progress
+from planner.table.wire import Wire
+from protocol import TableClient
+
+
+class RunOptions(NamedTuple):
+    """How a plan is run; see the options of `python -m planner run`."""
+
+    port: str
+    baud: int = 9600
+    decimals: int = 1
+    timeout_s: float = 1.0
+    lead_s: float = Settings().lead_s
+    tolerance_deg: float = DEFAULT_TOLERANCE_DEG
+    control: Path | None = None
+    arm_is_away: bool = False
+    time_scale: float = 1.0
+    pause_times: PauseTimes = PauseTimes()
+
+
+class Duration(NamedTuple):
+    """How long the table was busy: by the clock of its port, and by the one on the wall."""
+
+    table_s: float
+    wall_s: float
+
+    def __str__(self) -> str:
+        times_real = self.table_s / self.wall_s
+        return f"{self.table_s:.1f} s of the table took {self.wall_s:.2f} s: {times_real:.3g} times real time"
+
+
+class Finished(NamedTuple):
+    """What a run came to, and how long it took."""
+
+    checked: RunVerification
+    duration: Duration
+
+
+def run_plan(
+    plan_file: Path,
+    out: Path,
+    options: RunOptions,
+    map_file: Path | None = None,
+    progress: Progress | None = None,
+) -> Finished:
+    """Carry a plan out on the table at a port, write what happened to `out`, and return what it came to.
+
+    Raises:
+        PlannerError: the plan must not, or cannot, be run; nothing has moved.
+        TableError: the table could not be reached, or not be brought to the start.
+        OSError: the folder cannot be written.
+    """
+    map_file = map_file or plan_file.with_name(MAP_FILE)
+    run_input = load_run_input(plan_file, map_file)
+    limits, wire = run_input.problem.limits, Wire(options.decimals, options.baud)
+    motion = TableMotion(run_input.plan, limits, options.pause_times)
+    check_ends(run_input.problem.map, motion)
+    check_it_fits(stream(motion, limits, wire), wire)
+    out.mkdir(parents=True, exist_ok=True)
+    copy_input(out, plan_file, map_file)
+    with ExitStack() as stack:
+        table, view = _open(options, stack)
+        table_began_s, wall_began_s = table.clock.now_s(), time.perf_counter()
+        turns = _turns(run_input, motion, table.position_deg(), options.arm_is_away)
+        run_input = run_input.turned(turns)
+        motion = TableMotion(run_input.plan, limits, options.pause_times)
+        bring_to(table, motion.start_deg, limits, wire)
+        record = execute(table, motion, limits, wire, Settings(lead_s=options.lead_s), view, progress)
+        duration = Duration(table.clock.now_s() - table_began_s, time.perf_counter() - wall_began_s)
+    conditions = RunConditions(options.port, wire, options.lead_s, options.tolerance_deg, turns, options.pause_times)
+    checked = verify_run(run_input, motion, record, options.lead_s, options.tolerance_deg)
+    save_run(out, run_input, conditions, motion, record, checked)
+    save_robot(out, robot_motion(motion, run_input.joints_deg), record)
+    plot_run(StoredRun(run_input, conditions, motion, record), checked, out / "run.png")
+    return Finished(checked, duration)
+
+
+def _open(options: RunOptions, stack: ExitStack) -> tuple[TableClient, InsideView | None]:
+    """Return the table at the port, and a view into it where there is one; `stack` closes both."""
+    port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
+    table = stack.enter_context(TableClient(port, options.timeout_s * options.time_scale, options.decimals))
+    if options.control is None:
+        return table, view_of(port)
+    view = ControlView(options.control)
+    stack.callback(view.close)
+    return table, view
+
+
+def _turns(run_input: RunInput, motion: TableMotion, position_deg: float, arm_is_away: bool) -> int:
+    """Return the full turns to add to the plan, so that its start can be reached from where the table stands."""
+    if arm_is_away:
+        return nearest_turns(position_deg, motion.start_deg)
+    return turns_to_start(run_input.problem.map, position_deg, motion.start_deg)

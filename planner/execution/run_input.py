@@ -1,0 +1,112 @@
+"""What `run` works on: a plan file, checked against the map that it was made on."""
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.errors import PlannerError
+from planner.kinematics.configuration import Configuration
+from planner.map.map_file import MAP_FILE, load_maps
+from planner.planning.plan import Plan
+from planner.planning.plan_file import load_plan
+from planner.planning.problem import Problem
+from planner.planning.verification import verify
+from planner.table.cost import Weights
+from planner.table.motion import Limits, next_angle, next_speed
+
+_ROUNDING = 1e-6
+
+
+class RunInputError(PlannerError):
+    """A plan that must not be run: damaged, edited, or not of this map."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunInput:
+    """A plan and what it was made on.
+
+    Attributes:
+        name: what the scan is called.
+        plan: the table's motion.
+        problem: map, limits and weights.
+        joints_deg: (n + 1, 6) the arm's joints at each location.
+        document: the plan file as it was read.
+    """
+
+    name: str
+    plan: Plan
+    problem: Problem
+    joints_deg: FloatArray
+    document: dict[str, Any]
+
+    def turned(self, turns: int) -> "RunInput":
+        """Return the same scan, full turns of the table farther."""
+        plan = self.plan
+        shifted_deg = 360.0 * turns
+        pauses = tuple(
+            pause._replace(
+                from_angle_deg=pause.from_angle_deg + shifted_deg, to_angle_deg=pause.to_angle_deg + shifted_deg
+            )
+            for pause in plan.pauses
+        )
+        return replace(self, plan=replace(plan, angles_deg=plan.angles_deg + shifted_deg, pauses=pauses))
+
+
+def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
+    """Return a plan with its map, which is `map.npz` beside the plan unless another is given.
+
+    Raises:
+        PlannerError: a file cannot be read, is damaged or edited, or plan and map do not belong together.
+    """
+    plan = load_plan(plan_file)
+    map_file = map_file or plan_file.with_name(MAP_FILE)
+    try:
+        document = json.loads(plan_file.read_text(encoding="utf-8"))
+        name = str(document["provenance"]["scan"])
+        limits = Limits(**{key: float(value) for key, value in document["limits"].items()})
+        weights = Weights(float(document["weights"]["k_a"]), float(document["weights"]["k_w"]))
+        digest = document["provenance"]["map"].get("digest")
+        joints_deg = np.array(document["joints_deg"], dtype=np.float64)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise RunInputError(f"{plan_file}: is damaged: {type(error).__name__}, {error}") from error
+    if not map_file.is_file():
+        raise RunInputError(
+            f"{map_file}: the plan's map is not there; python -m planner map {name} --out {map_file.parent} writes it"
+        )
+    maps = load_maps(map_file)
+    configuration = Configuration.parse(plan.configuration)
+    if configuration not in maps or maps[configuration].metadata.get("digest") != digest:
+        raise RunInputError(f"{map_file}: is not the map that {plan_file} was made on; compute map and plan anew")
+    problem = Problem(maps[configuration], plan.step_s, limits, weights)
+    run_input = RunInput(name, plan, problem, joints_deg, document)
+    _check(plan_file, run_input)
+    return run_input
+
+
+def _check(plan_file: Path, run_input: RunInput) -> None:
+    """Refuse a plan that breaks its own equations, its limits, or a forbidden region."""
+    plan, problem = run_input.plan, run_input.problem
+    locations = problem.map.location_count
+    if len(plan.angles_deg) != locations or run_input.joints_deg.shape != (locations, 6):
+        raise RunInputError(f"{plan_file}: is damaged: its map has {locations} locations, and the plan has not")
+    numbers = plan.angles_deg, plan.speeds_deg_s, plan.accelerations_deg_s2
+    if not all(np.isfinite(array).all() for array in numbers):
+        raise RunInputError(f"{plan_file}: is damaged: it holds values that are no numbers")
+    paused = {pause.step for pause in plan.pauses}
+    for k, acceleration in enumerate(plan.accelerations_deg_s2):
+        angle, speed = float(plan.angles_deg[k]), float(plan.speeds_deg_s[k])
+        angle_error = plan.angles_deg[k + 1] - next_angle(angle, speed, float(acceleration), plan.step_s)
+        speed_error = plan.speeds_deg_s[k + 1] - next_speed(speed, float(acceleration), plan.step_s)
+        if k not in paused and max(abs(angle_error), abs(speed_error)) > _ROUNDING:
+            raise RunInputError(
+                f"{plan_file}: has been edited: angle, speed and acceleration of step {k} contradict one another"
+            )
+    checked = verify(problem, plan)
+    if not checked.within_limits:
+        raise RunInputError(f"{plan_file}: exceeds its own limits; plan anew")
+    if checked.forbidden_steps:
+        raise RunInputError(f"{plan_file}: meets a forbidden region in step {checked.forbidden_steps[0]}; plan anew")

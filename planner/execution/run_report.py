@@ -1,0 +1,99 @@
+"""A run as one HTML file that needs nothing else: verdict, figures, pictures as inline SVG, and all commands."""
+
+from collections.abc import Iterator
+
+from planner.execution.run_file import StoredRun
+from planner.execution.run_plots import deviation_figure, figure_style, map_figure, motion_figure
+from planner.execution.run_verification import RunVerification
+from planner.page import details, drawing, heading, note, page, table, verdict
+
+_NAMES = {
+    "encoder": "encoder",
+    "latch": "encoder, latched at the trigger (L)",
+    "reading": "encoder, polled (H)",
+    "reference": "reference, against the plan as commanded",
+    "true": "true angle of the table",
+}
+
+
+def run_report(run: StoredRun, checked: RunVerification) -> str:
+    """Return the page of a run."""
+    with figure_style():
+        on_map = drawing(map_figure(run, checked))
+        motion = drawing(motion_figure(run))
+        deviation = drawing(deviation_figure(run, checked))
+    wire = run.conditions.wire
+    blocks = (
+        verdict(checked.verdict, checked.is_verified),
+        table(("", ""), list(_summary(run, checked))),
+        heading("On the configuration map"),
+        note("Grey is allowed, the whiter the better; colours are forbidden. Both paths wrap at 360 degrees."),
+        on_map,
+        heading("Motion"),
+        motion,
+        heading("Deviation from the plan"),
+        note(
+            f"The dashed lines are the tolerance at the scan locations. L and H carry {wire.decimals} decimal(s), so up"
+            f" to {0.5 * wire.quantum:g} deg of their deviation is rounding. The true angle differs from the encoder's"
+            " by the backlash of the gears."
+        ),
+        deviation,
+        table(("in degrees", "at the locations", "anywhere", "rms"), list(_deviations(checked))),
+        heading("Cost, Eq. (7)"),
+        table(("", "acceleration", "speed", "value", "pauses", "total"), list(_costs(checked))),
+        heading("Commands"),
+        details(f"all {len(run.record.sent)} motion commands", _commands(run)),
+        _corrections(run),
+    )
+    return page(f"Run of {run.run_input.name}", blocks)
+
+
+def _summary(run: StoredRun, checked: RunVerification) -> Iterator[tuple[str, str]]:
+    plan, conditions = run.run_input.plan, run.conditions
+    yield "planned by", f"{plan.planner}, {plan.configuration}"
+    yield "locations", f"{len(plan.angles_deg)}, one every {plan.step_s:g} s, {len(plan.pauses)} pauses"
+    yield "port", f"{conditions.port}, {conditions.wire.baud} baud, {conditions.wire.decimals} decimal(s)"
+    yield "encoder at the locations", f"{checked.worst_deg:.3f} deg off at most, {checked.tolerance_deg:g} allowed"
+    yield "forbidden cells touched in", f"{len(checked.forbidden_steps)} steps"
+    yield "margin left to a forbidden cell", f"{checked.margin_deg:.2f} deg"
+    yield "latest command", f"{1000.0 * checked.latest_command_s:.1f} ms late"
+    yield "locations without a trigger", f"{len(checked.missing_triggers)}"
+    if conditions.turns:
+        yield "full turns added to the plan", f"{conditions.turns}, to start where the table stood"
+    yield "commands sent ahead by", f"{1000.0 * conditions.lead_s:g} ms"
+    if run.record.sent:
+        yield "if the line had died", f"at most {_longest_run_on_deg(run):.0f} deg until the table stood by itself"
+
+
+def _longest_run_on_deg(run: StoredRun) -> float:
+    return max(abs(sent.command.target_deg - run.motion.state_at(sent.time_s).angle_deg) for sent in run.record.sent)
+
+
+def _deviations(checked: RunVerification) -> Iterator[tuple[str, ...]]:
+    for name, text in _NAMES.items():
+        if (each := checked.deviations.get(name)) is not None:
+            yield text, f"{each.at_locations_deg:.4f}", f"{each.anywhere_deg:.4f}", f"{each.rms_deg:.4f}"
+
+
+def _costs(checked: RunVerification) -> Iterator[tuple[str, ...]]:
+    for name, cost in (("planned", checked.planned_cost), ("executed", checked.executed_cost)):
+        if cost is not None:
+            yield name, *(f"{term:.4f}" for term in (*cost, cost.total))
+
+
+def _commands(run: StoredRun) -> str:
+    rows = [
+        (f"{sent.time_s:.3f}", sent.phase, f"{sent.column}", f"{command.acceleration_deg_s2:g}",
+         f"{command.speed_deg_s:g}", f"{command.target_deg:g}", f"{1000.0 * sent.late_s:.1f}")
+        for sent in run.record.sent
+        for command in (sent.command,)
+    ]  # fmt: skip
+    return table(("time (s)", "phase", "location", "A (deg/s2)", "S (deg/s)", "P (deg)", "late (ms)"), rows)
+
+
+def _corrections(run: StoredRun) -> str:
+    corrections = run.record.corrections
+    if not corrections:
+        return note("Neither drift nor late commands had to be corrected.")
+    times = ", ".join(f"{each.time_s:.1f} s ({each.slip_deg:+.2f} deg)" for each in corrections)
+    return note(f"For drift or a late command the stream was computed anew at {times}.")

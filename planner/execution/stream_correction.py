@@ -1,0 +1,125 @@
+"""Keep a stream right while it runs: make up for commands that came late, and for a table that drifts.
+
+A stream is computed before the motion, from where the reference will be (`stream`). A command that takes effect late,
+and a table whose clock is not ours, leave the reference elsewhere. So the reference is followed by the controller's own
+rules, from each command as it was sent, and moved by what the readings of the encoder say. Where it is too far from
+where the next command expects it, the rest of the motion is streamed anew from where it is.
+"""
+
+from planner.execution.closest_command import latest_s
+from planner.execution.run_record import Correction
+from planner.execution.stream import TimedCommand, check_it_fits, stream
+from planner.execution.table_motion import TableMotion
+from planner.table.motion import Limits
+from planner.table.velocity_profile import ReferenceState, advance
+from planner.table.wire import Wire
+
+# A reference farther than this from where the stream had it is worth a new stream.
+_SLIP_DEG = 0.03
+
+
+class CorrectedStream:
+    """The commands of a motion, one after the other. All times are those of the motion.
+
+    Attributes:
+        corrections: where the commands were computed anew.
+        running: the last command that was sent: when it took effect, and where the reference then was.
+    """
+
+    def __init__(
+        self,
+        motion: TableMotion,
+        limits: Limits,
+        wire: Wire,
+        drift_deg: float,
+        drift_filter_s: float,
+        encoder_delay_s: float,
+    ) -> None:
+        """Compute the stream.
+
+        Args:
+            motion: what the table should do.
+            limits: greatest S and A.
+            wire: what the commands have to pass.
+            drift_deg: how far readings may be from where they were expected before the reference is moved.
+            drift_filter_s: over how long readings are averaged for that.
+            encoder_delay_s: how long after the reference's time in the stream the encoder is at the same angle.
+
+        Raises:
+            StreamError: the commands follow one another faster than the wire carries them.
+        """
+        self.corrections: list[Correction] = []
+        self.running: TimedCommand | None = None
+        self._motion, self._limits, self._wire = motion, limits, wire
+        self._drift_deg, self._encoder_delay_s = drift_deg, encoder_delay_s
+        self._drift = _Drift(drift_filter_s)
+        self._commands = stream(motion, limits, wire)
+        self._sent = 0
+        check_it_fits(self._commands, wire)
+
+    @property
+    def following(self) -> TimedCommand | None:
+        """The next command as it stands, not yet corrected; None when all are sent."""
+        return self._commands[self._sent] if self._sent < len(self._commands) else None
+
+    def next(self) -> TimedCommand | None:
+        """Return the next command, computed anew where that is called for; None when all are sent."""
+        self._correct()
+        return self.following
+
+    def latest_s(self, timed: TimedCommand) -> float:
+        """Return how late a command may be sent: the one before is good for so much longer than its step."""
+        return latest_s((self.running or timed).leg.duration_s)
+
+    def sent(self, timed: TimedCommand, late_s: float) -> None:
+        """Take note that the next command was sent, and how late."""
+        time_s = timed.time_s + max(0.0, late_s)
+        there = timed.expected if self.running is None else _reference_at(self.running, time_s)
+        self.running = timed._replace(time_s=time_s, expected=there)
+        self._sent += 1
+
+    def encoder_read(self, time_s: float, angle_deg: float) -> None:
+        """Take note of where the encoder was at a time that is known for certain."""
+        running = self.running
+        if running is not None and (reference_s := time_s - self._encoder_delay_s) >= running.time_s:
+            self._drift.take(time_s, angle_deg - _reference_at(running, reference_s).angle_deg)
+
+    def _correct(self) -> None:
+        running, timed = self.running, self.following
+        if running is None or timed is None:
+            return
+        if abs(self._drift.estimate_deg) > self._drift_deg:
+            angle_deg, speed_deg_s = running.expected
+            moved = ReferenceState(angle_deg + self._drift.estimate_deg, speed_deg_s)
+            self.running = running = running._replace(expected=moved)
+            self._drift.forget()
+        start = _reference_at(running, timed.time_s)
+        slip_deg = start.angle_deg - timed.expected.angle_deg
+        if abs(slip_deg) > _SLIP_DEG:
+            self.corrections.append(Correction(timed.time_s, slip_deg))
+            anew = stream(self._motion, self._limits, self._wire, self._sent, start)
+            self._commands = (*self._commands[: self._sent], *anew)
+
+
+def _reference_at(running: TimedCommand, time_s: float) -> ReferenceState:
+    return advance(running.expected, running.command, time_s - running.time_s)
+
+
+class _Drift:
+    """The mean of what the readings differ from what was expected, the latest counting most."""
+
+    def __init__(self, filter_s: float) -> None:
+        self._filter_s = filter_s
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self.estimate_deg = 0.0
+        self._last_s: float | None = None
+
+    def take(self, time_s: float, difference_deg: float) -> None:
+        """Take in one difference."""
+        if self._last_s is not None:
+            share = min(1.0, (time_s - self._last_s) / self._filter_s)
+            self.estimate_deg += share * (difference_deg - self.estimate_deg)
+        self._last_s = time_s

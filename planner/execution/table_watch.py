@@ -1,0 +1,170 @@
+"""Watch a table in motion: poll its position (H), read its latch at each scan location (L), look inside where possible.
+
+Nothing of this delays a command: a reading that would not be over in time is left to later.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from planner.execution.inside_view import InsideView
+from planner.execution.run_record import Observation, Record
+from planner.execution.table_motion import TableMotion
+from planner.progress import Progress
+from planner.table.wire import Wire
+from protocol import TableClient, TableError
+
+# What the bytes of H, or of L, and of its answer come to.
+_QUESTION_BYTES, _ANSWER_BYTES = 2, 10
+# A table at rest is within this of its target: 0.05 deg, and the rounding of its answer.
+_AT_REST_DEG = 0.15
+# What took longer than this has no certain time: the operating system was busy elsewhere.
+_CERTAIN_S = 0.01
+# A reading of the position that has waited this long comes before a trigger.
+_OVERDUE_S = 0.25
+
+
+class StrayedError(TableError):
+    """The table is not where the plan wants it."""
+
+
+class TableWatch:
+    """The eye on one motion; all times are those of the motion, whose 0 is `origin_s` of the record."""
+
+    def __init__(
+        self,
+        table: TableClient,
+        motion: TableMotion,
+        wire: Wire,
+        record: Record,
+        tolerance_deg: float,
+        poll_s: float,
+        look_s: float,
+        view: InsideView | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Watch a motion.
+
+        Args:
+            table: the client at the table's port.
+            motion: what the table should do.
+            wire: how long readings take.
+            record: gets what is seen.
+            tolerance_deg: how far the encoder may be from the plan.
+            poll_s: from one reading of the position to the next, at least.
+            look_s: the same for looks from inside.
+            view: a way to look into the table; then it also gets its triggers from here.
+            progress: called with the time of the motion and its end, in ms.
+        """
+        self._table, self._motion, self._wire, self._record = table, motion, wire, record
+        self._tolerance_deg, self._poll_s, self._look_s = tolerance_deg, poll_s, look_s
+        self._view, self._progress = view, progress
+        self._pending_columns = list(enumerate(motion.column_times_s))
+        self._next_poll_s = self._next_look_s = motion.start_s
+
+    def now_s(self) -> float:
+        """Return the time of the motion."""
+        return self._table.clock.now_s() - self._record.origin_s
+
+    def sleep_until(self, time_s: float) -> None:
+        """Sleep, and look inside meanwhile where that is possible."""
+        while (left_s := time_s - self.now_s()) > 0.0:
+            if self._view is None:
+                self._table.clock.sleep_s(left_s)
+                continue
+            look_in_s = self._next_look_s - self.now_s()
+            if look_in_s <= 0.0:
+                self._look()
+            else:
+                self._table.clock.sleep_s(min(left_s, look_in_s))
+
+    def read_until(self, time_s: float, take: Callable[[float, float], None]) -> None:
+        """Read latch and position, as often as there is time for it; then sleep.
+
+        Args:
+            time_s: when to be back.
+            take: called with the time and the position of each reading of the encoder whose time is certain.
+
+        Raises:
+            StrayedError: the table is not where the plan has it.
+        """
+        reading_s = self._wire.seconds(_QUESTION_BYTES + _ANSWER_BYTES) + self._wire.turnaround_s
+        while True:
+            column_s = float(self._pending_columns[0][1]) if self._pending_columns else float("inf")
+            now_s = self.now_s()
+            poll_s = max(now_s, self._next_poll_s)
+            # Triggers come first, but L does not tell whether the table strays: fast ones must not crowd out H.
+            is_overdue = now_s - self._next_poll_s > _OVERDUE_S
+            is_trigger = poll_s + reading_s > column_s and not is_overdue
+            begin_s = max(now_s, column_s) if is_trigger else poll_s
+            if begin_s + reading_s > time_s:
+                break
+            self.sleep_until(begin_s)
+            if is_trigger:
+                self._latch()
+            else:
+                self._poll(take)
+        self.sleep_until(time_s)
+
+    def wait_for_rest(self, target_deg: float) -> None:
+        """Wait until the table stands at its target.
+
+        Raises:
+            ArrivalTimeout: it does not.
+        """
+        position_deg = self._table.wait_until_at(target_deg, _AT_REST_DEG, timeout_s=3.0)
+        self._see(Observation(self.now_s(), "H", position_deg))
+
+    def _latch(self) -> None:
+        """Pull the trigger where it is ours to pull, and read the latch.
+
+        Unlike H, L is not held against the plan: it tells where the table was at the last trigger that it heard. A
+        trigger that was missed costs one profile (`planner.scanning.latching`) and must not stop the table.
+        """
+        column, column_s = self._pending_columns.pop(0)
+        time_s = float(column_s)  # a real probe pulled it then
+        if self._view is not None:
+            time_s = self.now_s()
+            self._view.trigger()
+            self._look(column)
+        self._see(Observation(time_s, "L", self._table.latched_deg(), column))
+
+    def _poll(self, take: Callable[[float, float], None]) -> None:
+        """Read the position, and stop the run where it is not that of the plan."""
+        self._next_poll_s = self.now_s() + self._poll_s
+        time_s = self.now_s() + self._wire.seconds(_QUESTION_BYTES)
+        position_deg = self._table.position_deg()
+        # The table looked at its encoder at some time from here to there: mostly here, when the answer is in time.
+        answered_s = self.now_s() - self._wire.seconds(_ANSWER_BYTES)
+        is_certain = answered_s - time_s < _CERTAIN_S
+        self._see(Observation(time_s, "H" if is_certain else "H late", position_deg))
+        self._check(position_deg, time_s, max(time_s, answered_s))
+        if is_certain:
+            take(time_s, position_deg)
+
+    def _check(self, position_deg: float, earliest_s: float, latest_s: float) -> None:
+        """Stop the run where the position is not what the plan has from one time to another."""
+        planned_deg = [self._motion.state_at(time_s).angle_deg for time_s in np.linspace(earliest_s, latest_s, 5)]
+        off_deg = max(min(planned_deg) - position_deg, position_deg - max(planned_deg))
+        if off_deg > self._tolerance_deg:
+            raise StrayedError(
+                f"at {earliest_s:.2f} s the table is at {position_deg:.1f} deg and should be at {planned_deg[0]:.1f},"
+                f" more than {self._tolerance_deg:g} deg off; does it turn freely?"
+            )
+
+    def _see(self, observation: Observation) -> None:
+        self._record.observations.append(observation)
+        if self._progress is not None:
+            self._progress(round(1000.0 * observation.time_s), round(1000.0 * self._motion.end_s))
+
+    def _look(self, column: int | None = None) -> None:
+        assert self._view is not None
+        begin_s = self.now_s()
+        look = self._view.look()
+        end_s = self.now_s()
+        self._next_look_s = end_s + self._look_s
+        if column is not None or end_s - begin_s < _CERTAIN_S:
+            time_s = 0.5 * (begin_s + end_s)
+            self._record.observations.append(
+                Observation(time_s, "inside", look.encoder_deg, column, look.reference_deg, look.true_deg)
+            )

@@ -1,0 +1,1 @@
+"""Shapes and distances: frames, capsules, meshes, distance fields and rays. It knows nothing of arms and tables."""

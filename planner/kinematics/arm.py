@@ -1,0 +1,147 @@
+"""A six-axis arm with a spherical wrist: its Denavit-Hartenberg table and its forward kinematics.
+
+Standard convention (Spong et al., 2005): frame i follows frame i - 1 by Rz(joint i) Tz(d) Tx(a) Rx(alpha).
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.errors import ArmTableError
+from planner.kernel import kernel
+from planner.toml_table import TomlTable
+
+_SHIPPED = Path(__file__).parents[1] / "arms"
+_ORTHO_PARALLEL_ALPHA_DEG = (-90.0, 0.0, 90.0, -90.0, 90.0, 0.0)
+
+
+# The columns of the table that the compiled kernels read, one row per joint.
+D_MM, A_MM, COS_ALPHA, SIN_ALPHA, LOWER_RAD, UPPER_RAD = range(6)
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A Denavit-Hartenberg table with joint limits and speeds, one entry per joint.
+
+    Attributes:
+        name: The maker's name of the arm.
+        d_mm: Offsets along the joint axes.
+        a_mm: Lengths of the common normals.
+        alpha_deg: Twists about the common normals.
+        lower_deg: Lower joint limits.
+        upper_deg: Upper joint limits.
+        max_speed_deg_s: Greatest joint speeds.
+
+    Raises:
+        ArmTableError: The arm is not ortho-parallel with a spherical wrist, which the closed-form inverse kinematics
+            need, or its limits contradict each other.
+    """
+
+    name: str
+    d_mm: tuple[float, ...]
+    a_mm: tuple[float, ...]
+    alpha_deg: tuple[float, ...]
+    lower_deg: tuple[float, ...]
+    upper_deg: tuple[float, ...]
+    max_speed_deg_s: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        columns = (self.d_mm, self.a_mm, self.alpha_deg, self.lower_deg, self.upper_deg, self.max_speed_deg_s)
+        if any(len(column) != 6 or not all(map(math.isfinite, column)) for column in columns):
+            raise ArmTableError(f"{self.name}: each column of the arm's table must hold 6 finite numbers")
+        self._check_shape()
+        bounds = zip(self.lower_deg, self.upper_deg, self.max_speed_deg_s, strict=True)
+        for joint, (lower, upper, speed) in enumerate(bounds, 1):
+            if not lower < upper:
+                raise ArmTableError(
+                    f"{self.name}: limits of joint {joint} are {lower:g}..{upper:g} deg; the lower must come first"
+                )
+            if not speed > 0:
+                raise ArmTableError(f"{self.name}: speed of joint {joint} is {speed:g} deg/s; it must be above 0")
+
+    def _check_shape(self) -> None:
+        mirrored = tuple(-alpha for alpha in _ORTHO_PARALLEL_ALPHA_DEG)
+        if self.alpha_deg not in (_ORTHO_PARALLEL_ALPHA_DEG, mirrored):
+            raise ArmTableError(
+                f"{self.name}: alpha_deg is {self.alpha_deg}; an ortho-parallel arm with a spherical wrist has"
+                f" {_ORTHO_PARALLEL_ALPHA_DEG} or all of them negated"
+            )
+        if any(self.a_mm[3:]) or self.d_mm[4]:
+            raise ArmTableError(
+                f"{self.name}: a_mm of joints 4 to 6 and d_mm of joint 5 are {self.a_mm[3:]} and {self.d_mm[4]:g};"
+                " in a spherical wrist they are 0"
+            )
+        if not (self.a_mm[1] > 0 and math.hypot(self.a_mm[2], self.d_mm[3]) > 0):
+            raise ArmTableError(f"{self.name}: a_mm of joint 2 and the forearm's length must be above 0")
+
+    @classmethod
+    def load(cls, file: Path | str = "viper_s650") -> "Arm":
+        """Return the arm of a TOML file, or a shipped arm by its name.
+
+        Raises:
+            ScanFileError: The file cannot be read, or a key is missing, unknown or of the wrong type.
+            ArmTableError: See the class.
+        """
+        shipped = _SHIPPED / f"{file}.toml"
+        top = TomlTable.load(shipped if shipped.is_file() else Path(file))
+        name = top.text("name")
+        rows = top.tables("joint", 6)
+        limits = [row.numbers("limits_deg", 2) for row in rows]
+        d_mm, a_mm, alpha_deg, max_speed_deg_s = (
+            tuple(row.number(key) for row in rows) for key in ("d_mm", "a_mm", "alpha_deg", "max_speed_deg_s")
+        )
+        for table in (top, *rows):
+            table.finish()
+        lower_deg, upper_deg = zip(*limits, strict=True)
+        return cls(name, d_mm, a_mm, alpha_deg, lower_deg, upper_deg, max_speed_deg_s)
+
+    @property
+    def table(self) -> FloatArray:
+        """The `(6, 6)` table as the kernels take it: one row per joint, the columns named D_MM to UPPER_RAD."""
+        # The twists are multiples of 90 degrees, whose sines and cosines are whole numbers.
+        alpha = np.radians(self.alpha_deg)
+        limits = np.radians(self.lower_deg), np.radians(self.upper_deg)
+        return np.column_stack((self.d_mm, self.a_mm, np.rint(np.cos(alpha)), np.rint(np.sin(alpha)), *limits))
+
+    def flange_poses(self, joints: FloatArray) -> FloatArray:
+        """Return T_BF `(n, 4, 4)`, flange in base, in mm, for joints `(n, 6)` in radians."""
+        return self.link_frames(joints)[:, 6]
+
+    def link_frames(self, joints: FloatArray) -> FloatArray:
+        """Return the frames `(n, 7, 4, 4)` in the base, in mm: base, then the frame after each joint."""
+        frames = np.zeros((len(joints), 7, 4, 4))
+        frames[:, :, 3, 3] = 1.0
+        _link_frames_of_each(self.table, np.ascontiguousarray(joints, dtype=np.float64), frames)
+        return frames
+
+
+@kernel
+def link_frames(arm: FloatArray, joints: FloatArray, frames: FloatArray) -> None:
+    """Write the base frame and the frame after each joint into `frames`, for an arm's table and joints `(6,)`.
+
+    Only the upper three rows are written, so `frames` may be `(7, 3, 4)` as well as `(7, 4, 4)`. The last is the
+    flange's. Fewer frames are those of the first joints.
+    """
+    for row in range(3):
+        for column in range(4):
+            frames[0, row, column] = 1.0 if row == column else 0.0
+    for j in range(len(frames) - 1):
+        c, s = math.cos(joints[j]), math.sin(joints[j])
+        ca, sa = arm[j, COS_ALPHA], arm[j, SIN_ALPHA]
+        a, d = arm[j, A_MM], arm[j, D_MM]
+        for row in range(3):
+            x, y, z = frames[j, row, 0], frames[j, row, 1], frames[j, row, 2]
+            across = c * y - s * x
+            frames[j + 1, row, 0] = c * x + s * y
+            frames[j + 1, row, 1] = ca * across + sa * z
+            frames[j + 1, row, 2] = ca * z - sa * across
+            frames[j + 1, row, 3] = frames[j, row, 3] + a * frames[j + 1, row, 0] + d * z
+
+
+@kernel
+def _link_frames_of_each(arm: FloatArray, joints: FloatArray, frames: FloatArray) -> None:
+    for i in range(len(joints)):
+        link_frames(arm, joints[i], frames[i])

@@ -1,0 +1,157 @@
+"""What a planner answers: a `Plan`, or `NoPlan` with the reason."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.arrays import BoolArray, FloatArray
+from planner.kernel import kernel
+from planner.map.config_map import column_value
+from planner.planning.problem import Problem, Terms
+from planner.table.cost import PathCost, acceleration_cost, speed_cost, value_cost
+
+
+class Pause(NamedTuple):
+    """The scan stops: retract the probe, turn the table from rest to rest, approach again.
+
+    It lies between location `step` and `step + 1`; the plan goes on at rest at `to_angle_deg`.
+    """
+
+    step: int
+    from_angle_deg: float
+    to_angle_deg: float
+
+
+class Infeasibility(Enum):
+    """Why there is no plan."""
+
+    BLOCKED_LOCATION = "a scan location has no allowed table angle"
+    START_FORBIDDEN = "the start is in a forbidden region"
+    UNREACHABLE = "no motion within the limits avoids the forbidden regions"
+
+
+@dataclass(frozen=True)
+class NoPlan:
+    """An expected failure.
+
+    Attributes:
+        planner: the planner's name.
+        infeasibility: the kind of failure.
+        location: the scan location at which it shows, where there is one.
+    """
+
+    planner: str
+    infeasibility: Infeasibility
+    location: int | None = None
+
+    @property
+    def reason(self) -> str:
+        """The reason in one sentence."""
+        where = "" if self.location is None else f" (location {self.location})"
+        return f"{self.planner}: {self.infeasibility.value}{where}"
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The table's motion along a scan path.
+
+    Eq. (3) and (4) hold exactly (to rounding) in every step but those of `pauses`, where the table comes to rest.
+
+    Attributes:
+        planner: the planner's name.
+        configuration: name of the arm configuration, "" where the map has none.
+        step_s: time of one step.
+        angles_deg: (n + 1,) unwrapped table angle at each location.
+        speeds_deg_s: (n + 1,) speed at each location.
+        accelerations_deg_s2: (n,) acceleration of each step, 0 in a pause.
+        cost: Eq. (7) by term.
+        pauses: where the scan stops.
+        computing_time_s: how long planning took, where the caller measured it.
+    """
+
+    planner: str
+    configuration: str
+    step_s: float
+    angles_deg: FloatArray
+    speeds_deg_s: FloatArray
+    accelerations_deg_s2: FloatArray
+    cost: PathCost
+    pauses: tuple[Pause, ...] = ()
+    computing_time_s: float | None = field(default=None, compare=False)
+
+
+Outcome = Plan | NoPlan
+
+
+def path_cost(
+    problem: Problem,
+    angles_deg: FloatArray,
+    speeds_deg_s: FloatArray,
+    accelerations_deg_s2: FloatArray,
+    pauses: Sequence[Pause] = (),
+) -> PathCost:
+    """Return Eq. (7) of a motion; each paused step costs C_pen in place of the terms of Eq. (5)."""
+    terms = problem.terms
+    moving = np.ones(problem.step_count, dtype=np.bool_)
+    moving[[pause.step for pause in pauses]] = False
+    return PathCost(
+        *_sum_costs(terms, moving, angles_deg, speeds_deg_s, accelerations_deg_s2), terms.pause_cost * len(pauses)
+    )
+
+
+@kernel
+def _sum_costs(
+    terms: Terms, moving: BoolArray, angles_deg: FloatArray, speeds_deg_s: FloatArray, accelerations_deg_s2: FloatArray
+) -> tuple[float, float, float]:
+    acceleration, speed, value = 0.0, 0.0, 0.0
+    for k in range(len(accelerations_deg_s2)):
+        value += value_cost(column_value(terms.values, terms.epsilon, k + 1, angles_deg[k + 1]))
+        if moving[k]:
+            acceleration += acceleration_cost(terms.acceleration_weight, accelerations_deg_s2[k])
+            speed += speed_cost(terms.speed_weight, speeds_deg_s[k + 1])
+    return acceleration, speed, value
+
+
+def make_plan(
+    problem: Problem,
+    planner: str,
+    angles_deg: FloatArray,
+    speeds_deg_s: FloatArray,
+    accelerations_deg_s2: FloatArray,
+    pauses: Sequence[Pause] = (),
+) -> Plan:
+    """Return the motion as a plan, with its cost."""
+    for array in (angles_deg, speeds_deg_s, accelerations_deg_s2):
+        array.setflags(write=False)
+    return Plan(
+        planner=planner,
+        configuration=str(problem.map.metadata.get("configuration", "")),
+        step_s=problem.step_s,
+        angles_deg=angles_deg,
+        speeds_deg_s=speeds_deg_s,
+        accelerations_deg_s2=accelerations_deg_s2,
+        cost=path_cost(problem, angles_deg, speeds_deg_s, accelerations_deg_s2, pauses),
+        pauses=tuple(pauses),
+    )
+
+
+def obvious_infeasibility(problem: Problem, planner: str) -> NoPlan | None:
+    """Return why nobody can cross the map, where one look at its columns tells."""
+    blocked = problem.map.blocked_locations
+    if blocked:
+        return NoPlan(planner, Infeasibility.BLOCKED_LOCATION, blocked[0])
+    angle = problem.start_angle_deg
+    if angle is not None and not problem.map.is_allowed(0, angle):
+        return NoPlan(planner, Infeasibility.START_FORBIDDEN, 0)
+    return None
+
+
+def greedy_start(problem: Problem) -> tuple[float, float]:
+    """Return the start of a planner that cannot weigh starts: where free, the brightest angle, at rest."""
+    angle = problem.start_angle_deg
+    if angle is None:
+        angle = float(problem.map.angles_deg[np.argmax(problem.map.values[0])])
+    return float(angle), float(problem.start_speed_deg_s or 0.0)

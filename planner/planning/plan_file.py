@@ -1,0 +1,114 @@
+"""A plan on disk: one JSON file with everything needed to run it. The same plan gives the same bytes."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.cell.scan import Scan
+from planner.errors import PlannerError
+from planner.kinematics.joint_path import JointPath
+from planner.planning.plan import Pause, Plan
+from planner.planning.problem import Problem
+from planner.planning.verification import verify
+from planner.software_version import software_version
+from planner.table.cost import PathCost
+from planner.whole_file import write_whole
+
+_FORMAT = "seventh-axis plan"
+_FORMAT_VERSION = 1
+_DECIMALS = 9
+
+
+class PlanFileError(PlannerError):
+    """A file that cannot be read or holds no plan."""
+
+
+def plan_document(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -> dict[str, Any]:
+    """Return a plan with its scan, its limits and where it comes from, as JSON can hold it.
+
+    Angles are degrees, lengths mm, times s; `locations` holds the probe's poses in the workpiece frame, row by row.
+    """
+    checked = verify(problem, plan)
+    cell = scan.cell
+    return {
+        "format": _FORMAT,
+        "format_version": _FORMAT_VERSION,
+        "planner": plan.planner,
+        "configuration": plan.configuration,
+        "step_s": plan.step_s,
+        "table": {
+            "angles_deg": plan.angles_deg.tolist(),
+            "speeds_deg_s": plan.speeds_deg_s.tolist(),
+            "accelerations_deg_s2": plan.accelerations_deg_s2.tolist(),
+            "pauses": [pause._asdict() for pause in plan.pauses],
+        },
+        "joints_deg": _rounded(np.degrees(joints.joints)),
+        "locations": _rounded(scan.path.T_WS),
+        "cell": {"T_BT": _rounded(cell.T_BT), "T_TW": _rounded(cell.T_TW), "T_FS": _rounded(cell.T_FS)},
+        "limits": problem.limits._asdict(),
+        "weights": {"k_a": problem.terms.acceleration_weight, "k_w": problem.terms.speed_weight},
+        "cost": plan.cost._asdict() | {"total": plan.cost.total},
+        "margins": {
+            "clearance_deg": checked.clearance_deg if np.isfinite(checked.clearance_deg) else None,
+            "speed_deg_s": checked.speed_margin_deg_s,
+            "acceleration_deg_s2": checked.acceleration_margin_deg_s2,
+        },
+        "provenance": {
+            "scan": scan.name,
+            "software_version": software_version(),
+            "map": _plain({k: v for k, v in problem.map.metadata.items() if k != "reasons"}),
+            "map_angles": problem.map.angle_count,
+            "map_epsilon": problem.map.epsilon,
+        },
+    }
+
+
+def save_plan(file: Path, document: dict[str, Any]) -> None:
+    """Write a plan to `file`, which appears when it is whole."""
+    write_whole(file, json.dumps(document, indent=1, allow_nan=False) + "\n")
+
+
+def load_plan(file: Path) -> Plan:
+    """Return the table's motion that a file holds.
+
+    Raises:
+        PlanFileError: the file cannot be read, or is no plan of this format.
+    """
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+        if (document["format"], document["format_version"]) != (_FORMAT, _FORMAT_VERSION):
+            raise PlanFileError(f"{file}: is not a plan of format version {_FORMAT_VERSION}")
+        table, cost = document["table"], dict(document["cost"])
+        cost.pop("total")
+        plan = Plan(
+            planner=str(document["planner"]),
+            configuration=str(document["configuration"]),
+            step_s=float(document["step_s"]),
+            angles_deg=np.array(table["angles_deg"], dtype=np.float64),
+            speeds_deg_s=np.array(table["speeds_deg_s"], dtype=np.float64),
+            accelerations_deg_s2=np.array(table["accelerations_deg_s2"], dtype=np.float64),
+            cost=PathCost(**cost),
+            pauses=tuple(Pause(**pause) for pause in table["pauses"]),
+        )
+    except OSError as error:
+        raise PlanFileError(f"{file}: cannot be read ({error.strerror or error})") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise PlanFileError(f"{file}: holds no plan that this program has written") from error
+    if not len(plan.angles_deg) == len(plan.speeds_deg_s) == len(plan.accelerations_deg_s2) + 1:
+        raise PlanFileError(f"{file}: is damaged: angles, speeds and accelerations do not belong together")
+    return plan
+
+
+def _rounded(array: FloatArray) -> list[Any]:
+    """Return nested lists without noise below a nanometre, and None where there is no number."""
+    rounded = (np.round(array, _DECIMALS) + 0.0).astype(object)
+    rounded[np.isnan(array)] = None
+    return list(rounded.tolist())
+
+
+def _plain(value: object) -> object:
+    """Return the value as JSON can hold it."""
+    return json.loads(json.dumps(value, default=str))

@@ -1,0 +1,31 @@
+"""All planners by name."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from planner.planning import (
+    dijkstra,
+    dynamic_programming,
+    local_maxima,
+    ray_shooting,
+    receding,
+    rotate_when_blocked,
+)
+from planner.planning.plan import Outcome
+from planner.planning.problem import Problem
+
+Planner = Callable[[Problem], Outcome]
+
+DEFAULT_PLANNER = dynamic_programming.NAME
+
+PLANNERS: Mapping[str, Planner] = MappingProxyType(
+    {
+        dynamic_programming.NAME: dynamic_programming.dynamic_programming,
+        receding.NAME: receding.receding,
+        ray_shooting.GUIDED_NAME: ray_shooting.guided_ray_shooting,
+        ray_shooting.NAME: ray_shooting.ray_shooting,
+        rotate_when_blocked.NAME: rotate_when_blocked.rotate_when_blocked,
+        dijkstra.NAME: dijkstra.dijkstra,
+        local_maxima.NAME: local_maxima.local_maxima,
+    }
+)

@@ -1,0 +1,105 @@
+"""The grid of angles and speeds on which a cost-to-go is sampled."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.arrays import FloatArray, IndexArray
+from planner.errors import PlannerError
+from planner.map.config_map import SAMPLE_TOLERANCE
+from planner.planning.problem import Problem
+
+
+class GridError(PlannerError):
+    """A grid that does not fit into memory."""
+
+
+class Grid(NamedTuple):
+    """Where the cost-to-go is sampled.
+
+    Attributes:
+        angle_count: angles over one turn.
+        angle_origin_deg: the first of them.
+        speed_step_deg_s: distance of neighbouring speeds.
+        half_count: speeds run from -half_count to half_count steps.
+        jumps: (n_jumps,) the changes of speed that a step may make, in speed steps, ascending.
+    """
+
+    angle_count: int
+    angle_origin_deg: float
+    speed_step_deg_s: float
+    half_count: int
+    jumps: IndexArray
+
+    @property
+    def speeds_deg_s(self) -> FloatArray:
+        """The (2 half_count + 1,) speeds of the grid, ascending."""
+        top_deg_s = self.half_count * self.speed_step_deg_s
+        return np.linspace(-top_deg_s, top_deg_s, 2 * self.half_count + 1)
+
+    def state_count(self, column_count: int) -> int:
+        """Return the number of states of a cost-to-go over so many columns."""
+        return column_count * (2 * self.half_count + 1) * self.angle_count
+
+
+def ladder(reach: int, count: int) -> IndexArray:
+    """Return up to `count` changes of speed within `reach` grid steps: odd, symmetric, with 0, denser near 0."""
+    half = (count - 1) // 2
+    rungs = {max(i, round(reach * (i / half) ** 2)) for i in range(half + 1)} if half else {0}
+    positive = sorted(rung for rung in rungs if rung <= reach)
+    return np.array(sorted({sign * rung for rung in positive for sign in (-1, 1)}), dtype=np.int64)
+
+
+def default_grid(
+    problem: Problem, refinement: int = 2, speed_count: int = 61, jump_count: int = 15, least_reach: int = 4
+) -> Grid:
+    """Return a grid that has the full acceleration among its jumps.
+
+    Where the table is slow to gain speed the grid has more speeds, so that at least `least_reach` jumps each way exist;
+    and where it cannot reach its greatest speed within the map, the grid ends at what it can reach.
+
+    Args:
+        problem: what is to be crossed.
+        refinement: angles of the grid per sample of the map.
+        speed_count: speeds, about.
+        jump_count: changes of speed per step, at most.
+        least_reach: speed steps within the acceleration limit, at least.
+    """
+    angle_count = problem.map.angle_count * refinement
+    half = (speed_count - 1) // 2
+    gain_deg_s = problem.limits.acceleration_deg_s2 * problem.step_s
+    top_deg_s = _attainable_speed(problem)
+    if gain_deg_s >= 2.0 * top_deg_s:
+        return Grid(angle_count, 0.0, top_deg_s / half, half, ladder(2 * half, jump_count))
+    reach = max(least_reach, round(gain_deg_s * half / top_deg_s))
+    step_deg_s = gain_deg_s / reach
+    half_count = max(1, math.floor(top_deg_s / step_deg_s + SAMPLE_TOLERANCE))
+    return Grid(angle_count, 0.0, step_deg_s, half_count, ladder(reach, jump_count))
+
+
+def exact_grid(problem: Problem, refinement: int, jump_count: int = 21) -> Grid:
+    """Return a grid on which every step ends exactly on a node, so that nothing is interpolated.
+
+    A step from speed i to speed j moves the angle by (i + j) / 2 speed steps x time; with the speed step at two angle
+    steps per time step, that is i + j angle steps.
+
+    Args:
+        problem: what is to be crossed; the angles of the grid count from its start angle.
+        refinement: angles of the grid per sample of the map.
+        jump_count: changes of speed per step, at most.
+    """
+    angle_count = problem.map.angle_count * refinement
+    step_deg_s = 2.0 * 360.0 / angle_count / problem.step_s
+    half_count = math.floor(_attainable_speed(problem) / step_deg_s + SAMPLE_TOLERANCE)
+    reach = math.floor(problem.limits.acceleration_deg_s2 * problem.step_s / step_deg_s + SAMPLE_TOLERANCE)
+    jumps = ladder(min(reach, 2 * half_count), jump_count)
+    return Grid(angle_count, problem.start_angle_deg or 0.0, step_deg_s, half_count, jumps)
+
+
+def _attainable_speed(problem: Problem) -> float:
+    """Return the greatest speed that can occur along the path."""
+    if problem.start_speed_deg_s is None:
+        return problem.limits.speed_deg_s
+    gain_deg_s = problem.limits.acceleration_deg_s2 * problem.step_s
+    return min(problem.limits.speed_deg_s, abs(problem.start_speed_deg_s) + problem.step_count * gain_deg_s)

@@ -1,0 +1,67 @@
+"""Check a plan as it would be executed, whoever made it: forbidden regions, limits, and how far it stays from both."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.map.config_map import column_value
+from planner.planning.crossing import step_is_allowed
+from planner.planning.plan import Plan
+from planner.planning.problem import Problem
+
+# Speeds and accelerations come out of additions: this much above a limit is rounding.
+ROUNDING = 1e-9
+
+
+class Verification(NamedTuple):
+    """What the execution of a plan would meet.
+
+    Attributes:
+        forbidden_steps: steps that meet a forbidden region at their end or on the way to it.
+        clearance_deg: least distance from a forbidden sample, along the angle axis, over all locations;
+            infinite where no location has any.
+        speed_margin_deg_s: what is left to the speed limit; negative where it is exceeded.
+        acceleration_margin_deg_s2: what is left to the acceleration limit; negative where it is exceeded.
+    """
+
+    forbidden_steps: tuple[int, ...]
+    clearance_deg: float
+    speed_margin_deg_s: float
+    acceleration_margin_deg_s2: float
+
+    @property
+    def within_limits(self) -> bool:
+        """Whether neither limit is exceeded by more than rounding."""
+        return self.speed_margin_deg_s >= -ROUNDING and self.acceleration_margin_deg_s2 >= -ROUNDING
+
+    @property
+    def is_executable(self) -> bool:
+        """Whether the table can carry the plan out and nothing forbidden is met."""
+        return self.within_limits and not self.forbidden_steps
+
+
+def verify(problem: Problem, plan: Plan) -> Verification:
+    """Return what the execution of a plan would meet. In a pause only the end of the step counts."""
+    limits = problem.limits
+    return Verification(
+        forbidden_steps=_forbidden_steps(problem, plan),
+        clearance_deg=min(
+            problem.map.forbidden_distance_deg(k, float(angle_deg)) for k, angle_deg in enumerate(plan.angles_deg)
+        ),
+        speed_margin_deg_s=limits.speed_deg_s - float(np.abs(plan.speeds_deg_s).max()),
+        acceleration_margin_deg_s2=limits.acceleration_deg_s2 - float(np.abs(plan.accelerations_deg_s2).max()),
+    )
+
+
+def _forbidden_steps(problem: Problem, plan: Plan) -> tuple[int, ...]:
+    terms, paused = problem.terms, {pause.step for pause in plan.pauses}
+    forbidden = []
+    for k, acceleration in enumerate(plan.accelerations_deg_s2):
+        if k in paused:
+            is_allowed = column_value(terms.values, terms.epsilon, k + 1, plan.angles_deg[k + 1]) > terms.epsilon
+        else:
+            state = plan.angles_deg[k], plan.speeds_deg_s[k], acceleration
+            is_allowed = step_is_allowed(terms.runs, k, *state, terms.step_s)
+        if not is_allowed:
+            forbidden.append(k)
+    return tuple(forbidden)

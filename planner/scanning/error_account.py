@@ -1,0 +1,237 @@
+"""What each part of the chain contributes to the error of the cloud, found by switching it off.
+
+A scan's own profiles are aligned again and again, each time with one contribution made perfect, or all but one. The
+chain of the table's angle, from the truth to the wire:
+
+    true angle at the exposure -> [timing] -> at the edge -> [encoder] -> a count -> [backlash] -> [rounding] -> wire
+
+With all switched on the angle is exactly that of the wire; with all off it is exactly the true one.
+"""
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+import trimesh
+
+from planner.arrays import FloatArray, IndexArray
+from planner.scanning.alignment import Calibration, aligned, probe_poses
+from planner.scanning.latched_run import LatchedRun
+from planner.scanning.probe import Profiles
+
+# The table's encoder: 384 counts a motor turn, 480 motor turns a table turn.
+COUNTS_PER_DEG = 512.0
+# At most so many points are looked at, and at least half as many of a larger cloud: their sigma is good to 0.5 %.
+SAMPLES = 40_000
+
+
+class Part(StrEnum):
+    """A contribution to the error."""
+
+    PROBE = "probe noise"
+    ROUNDING = "rounding on the wire"
+    ENCODER = "encoder"
+    BACKLASH = "backlash"
+    TIMING = "trigger timing"
+    CALIBRATION = "calibration"
+
+
+TABLE_PARTS = (Part.ROUNDING, Part.ENCODER, Part.BACKLASH)
+
+
+class Distances(NamedTuple):
+    """Signed distances to the surface, outward positive, in mm: `p95` and `greatest` are without sign."""
+
+    mean: float
+    sigma: float
+    p95: float
+    greatest: float
+
+    @classmethod
+    def of(cls, distances_mm: FloatArray) -> "Distances":
+        """Return the figures of some distances."""
+        size = np.abs(distances_mm)
+        return cls(*map(float, (distances_mm.mean(), distances_mm.std(), np.percentile(size, 95.0), size.max())))
+
+
+class Contribution(NamedTuple):
+    """One part's share, in mm.
+
+    Attributes:
+        displacement_mm: Root mean square of how far it alone moves the points.
+        across_mm: The same across the surface, which is what is seen as distance from it.
+        without_mm: Across the surface, what is left when it alone is switched off.
+    """
+
+    displacement_mm: float
+    across_mm: float
+    without_mm: float
+
+
+class Total(NamedTuple):
+    """All parts together, in mm; as in `Contribution`."""
+
+    displacement_mm: float
+    across_mm: float
+
+
+@dataclass(frozen=True, eq=False)
+class Account:
+    """The error of a cloud.
+
+    Attributes:
+        distances: Cloud against mesh, exactly, over the samples.
+        total: All parts together.
+        none_mm: Displacement with all of them off: what is left is the arithmetic's rounding.
+        parts: Each part.
+        sum_mm: Root of the sum of the parts' squares, to be compared with `total.displacement_mm`.
+        rounding_mm: What rounding comes to in closed form: a uniform error of one step, times the radius.
+        radius_mm: Root mean square of the points' distance from the table's axis.
+        samples: How many points it was made from.
+        errors_mm: `(samples,)` signed distance of each.
+        points_W: `(samples, 3)` where they are.
+    """
+
+    distances: Distances
+    total: Total
+    none_mm: float
+    parts: dict[Part, Contribution]
+    sum_mm: float
+    rounding_mm: float
+    radius_mm: float
+    samples: int
+    errors_mm: FloatArray
+    points_W: FloatArray
+
+
+class Samples:
+    """An even choice of a cloud's points, with what is true of them, in bounded memory.
+
+    When it is full every other point is given up, and from then on half as many are taken.
+    """
+
+    def __init__(self, most: int = SAMPLES) -> None:
+        """Hold up to `most` points."""
+        self._most, self._every, self._passed = most, 1, 0
+        self._kept: list[tuple[IndexArray, Profiles]] = []
+        self.count = 0
+
+    def take(self, first_row: int, profiles: Profiles) -> None:
+        """Choose from the profiles of a block whose first row in the run is `first_row`."""
+        order = self._passed + np.arange(len(profiles.profiles))
+        self._passed += len(order)
+        self._keep(order, profiles._replace(profiles=profiles.profiles + first_row))
+        while self.count > self._most:
+            self._every *= 2
+            kept, self._kept, self.count = self._kept, [], 0
+            for each in kept:
+                self._keep(*each)
+
+    def _keep(self, order: IndexArray, profiles: Profiles) -> None:
+        chosen = order % self._every == 0
+        self._kept.append((order[chosen], Profiles._make(part[chosen] for part in profiles)))
+        self.count += int(chosen.sum())
+
+    def all(self) -> Profiles:
+        """Return the points chosen; `profiles` are rows of the run."""
+        return Profiles._make(np.concatenate(column) for column in zip(*(each for _, each in self._kept), strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A run with the true placements and those that it was aligned with: it can be aligned with any parts off.
+
+    Attributes:
+        run: What was latched.
+        true: The placements as they are.
+        known: The placements as calibrated.
+        flange_poses: The arm's forward kinematics, joints (deg) to `(n, 4, 4)`.
+    """
+
+    run: LatchedRun
+    true: Calibration
+    known: Calibration
+    flange_poses: Callable[[FloatArray], FloatArray]
+
+    def angles_deg(self, on: Collection[Part]) -> FloatArray:
+        """Return the table's angle as latched with some parts of the chain switched on."""
+        run = self.run
+        angle = run.edge_deg if Part.TIMING in on else run.true_deg
+        if run.tells_truth:
+            # How far the teeth are apart, to a count.
+            gap = run.latched_deg - counted_deg(run.edge_deg)
+            angle = counted_deg(angle) if Part.ENCODER in on else angle
+            angle = angle + gap if Part.BACKLASH in on else angle
+            # The wire's error is taken as it was, so that all parts together are the wire.
+            angle = angle + (run.angles_deg - run.latched_deg) if Part.ROUNDING in on else angle
+        return angle
+
+    def poses(self, on: Collection[Part]) -> FloatArray:
+        """Return T_WS `(n, 4, 4)` with some parts switched on."""
+        joints = self.run.joints_deg if Part.TIMING in on else self.run.true_joints_deg
+        placements = self.known if Part.CALIBRATION in on else self.true
+        return probe_poses(placements, self.flange_poses(joints), self.angles_deg(on))
+
+
+def counted_deg(angles_deg: FloatArray) -> FloatArray:
+    """Return angles as an encoder without backlash would count them."""
+    return np.asarray(np.round(angles_deg * COUNTS_PER_DEG) / COUNTS_PER_DEG)
+
+
+def account(chain: Chain, samples: Profiles, mesh: trimesh.Trimesh, wire_step_deg: float) -> Account:
+    """Return what contributes how much to the error of a cloud's samples.
+
+    Args:
+        chain: The run, and what is true.
+        samples: Points of it.
+        mesh: The workpiece.
+        wire_step_deg: The wire's smallest difference.
+    """
+    everything = frozenset(Part)
+
+    def moved(on: Collection[Part]) -> FloatArray:
+        points_S = (
+            samples.points_S if Part.PROBE in on else samples.points_S - samples.noise_mm[:, None] * samples.rays_S
+        )
+        return aligned(chain.poses(on), samples.profiles, points_S) - samples.true_W
+
+    def across_mm(displacement: FloatArray) -> float:
+        return _rms(np.einsum("ij,ij->i", displacement, samples.normals_W))
+
+    def contribution(part: Part) -> Contribution:
+        alone = moved({part})
+        return Contribution(_rms(alone, 3), across_mm(alone), across_mm(moved(everything - {part})))
+
+    together, none = moved(everything), moved(())
+    parts = {part: contribution(part) for part in Part if chain.run.tells_truth or part not in TABLE_PARTS}
+    points_W = samples.true_W + together
+    errors_mm = signed_distances_mm(mesh, points_W)
+    T_TW = chain.true.T_TW
+    radii_mm = np.hypot(*(samples.true_W @ T_TW[:2, :3].T + T_TW[:2, 3]).T)
+    radius_mm = _rms(radii_mm)
+    return Account(
+        distances=Distances.of(errors_mm),
+        total=Total(_rms(together, 3), across_mm(together)),
+        none_mm=_rms(none, 3),
+        parts=parts,
+        sum_mm=float(np.sqrt(sum(part.displacement_mm**2 for part in parts.values()))),
+        rounding_mm=float(np.radians(wire_step_deg / np.sqrt(12.0)) * radius_mm),
+        radius_mm=radius_mm,
+        samples=len(errors_mm),
+        errors_mm=errors_mm,
+        points_W=points_W,
+    )
+
+
+def signed_distances_mm(mesh: trimesh.Trimesh, points: FloatArray) -> FloatArray:
+    """Return the distance `(n,)` of each point `(n, 3)` from the nearest place of a surface, outside positive."""
+    nearest, distances_mm, triangles = mesh.nearest.on_surface(points)
+    outward = np.einsum("ij,ij->i", points - nearest, np.asarray(mesh.face_normals)[triangles])
+    return np.asarray(np.copysign(distances_mm, outward))
+
+
+def _rms(values: FloatArray, dimensions: int = 1) -> float:
+    """Return the root mean square of values, or of vectors' lengths; 0 of none."""
+    return float(np.sqrt(dimensions * np.mean(np.square(values)))) if values.size else 0.0

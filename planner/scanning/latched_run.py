@@ -1,0 +1,214 @@
+"""The motion of a scan on a table, with the probe firing: what was latched on each trigger.
+
+Nothing is measured here yet; this is the part that needs the table, and it ends with one row for each profile.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.arrays import FloatArray, IndexArray
+from planner.errors import PlannerError
+from planner.execution.execute import Settings, bring_to, execute
+from planner.execution.robot_motion import RobotMotion, robot_motion
+from planner.execution.run_record import Record
+from planner.execution.table_motion import Phase, TableMotion
+from planner.planning.plan import Plan
+from planner.progress import Progress
+from planner.scanning.latching import Drop, Pairing, RobotLatch, TableReading, Tolerances, Trigger, pair
+from planner.scanning.trigger_line import TriggerFaults, TriggerLine, robot_latch_times_s
+from planner.table.motion import Limits
+from planner.table.wire import Wire
+from protocol import TableClient
+
+# The first profile comes when the first command has been sent.
+_FIRST_PROFILE_S = 0.06
+# From a trigger to the reading of its latch.
+_READING_AFTER_S = 0.002
+# How much more the table may be off its plan at one trigger than at those around it; the stand-in stays below a half.
+_TRACKING_DEG = 0.08
+
+
+class NothingScannedError(PlannerError):
+    """A scan in which no profile has both a robot pose and a table angle."""
+
+
+class TriggerConditions(NamedTuple):
+    """How the probe fires.
+
+    Attributes:
+        rate_hz: Profiles a second.
+        delay_s: The longest that an edge takes to the robot or to the table (an estimate: what optocouplers take).
+        faults: What goes wrong on the way.
+        seed: Chooses the delays.
+    """
+
+    rate_hz: float = 25.0
+    delay_s: float = 0.0001
+    faults: TriggerFaults = TriggerFaults()
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class LatchedRun:
+    """The profiles that have a robot pose and a table angle, `n` of them, and what is true of them.
+
+    Attributes:
+        numbers: `(n,)` of the profiles.
+        times_s: `(n,)` in the time of the motion.
+        joints_deg: `(n, 6)` as latched.
+        angles_deg: `(n,)` table angles as they came over the wire.
+        true_joints_deg: `(n, 6)` when the profile was taken.
+        true_deg: `(n,)` the table's own angle then; where the port does not tell, that of the wire.
+        edge_deg: `(n,)` the table's own angle when its trigger arrived, or as `true_deg`.
+        latched_deg: `(n,)` the encoder then, before rounding, or as `true_deg`.
+        tells_truth: Whether the port told these three.
+        triggers: How many profiles the probe took along the path.
+        dropped: Why the other profiles have no pose, by their number.
+        failure: Why the motion ended early; None when it came to its end.
+    """
+
+    numbers: IndexArray
+    times_s: FloatArray
+    joints_deg: FloatArray
+    angles_deg: FloatArray
+    true_joints_deg: FloatArray
+    true_deg: FloatArray
+    edge_deg: FloatArray
+    latched_deg: FloatArray
+    tells_truth: bool
+    triggers: int
+    dropped: dict[int, Drop]
+    failure: str | None
+
+
+class ReadingMotion(TableMotion):
+    """A plan's motion whose latch is read after each profile, not at each scan location."""
+
+    def __init__(self, plan: Plan, limits: Limits, rate_hz: float) -> None:
+        """Lay out the motion; from `_FIRST_PROFILE_S` on there is a profile in each period of the scan's legs."""
+        super().__init__(plan, limits)
+        self._rate_hz = rate_hz
+
+    @cached_property
+    def column_times_s(self) -> FloatArray:
+        """(n,) when to read: the first starts the probe, the others come after their profiles."""
+        count = int((self.scan_end_s - _FIRST_PROFILE_S) * self._rate_hz) + 1
+        times_s = _FIRST_PROFILE_S + np.arange(max(1, count)) / self._rate_hz
+        times_s[1:] += _READING_AFTER_S
+        return np.array([time_s for time_s in times_s.tolist() if self.is_scanning(time_s)])
+
+    @property
+    def scan_end_s(self) -> float:
+        """When the last scan location is reached."""
+        return max((leg.end_s for leg in self.legs if leg.phase is Phase.SCAN), default=0.0)
+
+    def is_scanning(self, time_s: float) -> bool:
+        """Return whether the probe is on its path: neither in a pause nor before or after it all."""
+        return 0.0 <= time_s <= self.scan_end_s and self.leg_at(time_s).phase is Phase.SCAN
+
+
+def run_latched(
+    table: TableClient,
+    line: TriggerLine,
+    plan: Plan,
+    joints_deg: FloatArray,
+    limits: Limits,
+    wire: Wire,
+    conditions: TriggerConditions,
+    progress: Progress | None = None,
+) -> LatchedRun:
+    """Make the motion of a plan, with the probe firing, and return what was latched.
+
+    Args:
+        table: The client at the table's port.
+        line: The probe's triggers.
+        plan: The table's motion.
+        joints_deg: `(n + 1, 6)` the robot's joints at the plan's locations.
+        limits: Greatest S and A.
+        wire: What the commands have to pass.
+        conditions: How the probe fires.
+        progress: Called with the time of the motion and its end, in ms.
+
+    Raises:
+        NothingScannedError: No profile is complete.
+        PlannerError: The commands do not fit the wire.
+        TableError: The table did not come to the start.
+    """
+    motion = ReadingMotion(plan, limits, conditions.rate_hz)
+    bring_to(table, round(motion.start_deg, wire.decimals), limits, wire)
+    settings = Settings()
+    record = execute(table, motion, limits, wire, settings, line, progress)
+    line.stop()
+    times_s = line.times_s() - record.origin_s
+    triggers = [Trigger(k, time_s) for k, time_s in enumerate(times_s.tolist()) if motion.is_scanning(time_s)]
+    robot = robot_motion(motion, joints_deg)
+    latches = _robot_latches(robot, times_s, conditions)
+    readings = list(_readings(record, wire))
+    # Half a step of the wire may be rounded off.
+    tolerances = Tolerances(table_deg=_TRACKING_DEG + 0.5 * wire.quantum)
+    pairing = pair(
+        triggers, latches, readings, lambda at_s: motion.state_at(at_s - settings.encoder_delay_s).angle_deg, tolerances
+    )
+    if not len(pairing.numbers):
+        raise NothingScannedError(_why_nothing(triggers, pairing.dropped, record.failure))
+    true_deg, edge_deg, latched_deg, tells_truth = _truth(line, pairing)
+    return LatchedRun(
+        numbers=pairing.numbers,
+        times_s=times_s[pairing.numbers],
+        joints_deg=pairing.joints_deg,
+        angles_deg=pairing.angles_deg,
+        true_joints_deg=_joints_at(robot, times_s[pairing.numbers]),
+        true_deg=true_deg,
+        edge_deg=edge_deg,
+        latched_deg=latched_deg,
+        tells_truth=tells_truth,
+        triggers=len(triggers),
+        dropped=pairing.dropped,
+        failure=record.failure,
+    )
+
+
+def _robot_latches(robot: RobotMotion, times_s: FloatArray, conditions: TriggerConditions) -> list[RobotLatch]:
+    """Return what an ideal robot latches on the triggers that arrive there."""
+    at_s = robot_latch_times_s(times_s, conditions.delay_s, conditions.faults, conditions.seed)
+    return [RobotLatch(time_s, joints) for time_s, joints in zip(at_s, _joints_at(robot, at_s), strict=True)]
+
+
+def _truth(line: TriggerLine, pairing: Pairing) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
+    """Return the table's angle at the exposures and at the edges, the encoder there, and whether the port told them."""
+    truth = line.truth()
+    if truth is None:
+        return pairing.angles_deg, pairing.angles_deg, pairing.angles_deg, False
+    true_deg, edge_deg, latched_deg = (part[pairing.numbers] for part in truth)
+    # The table may have missed a trigger in such slow motion that nobody could tell.
+    edge_deg, latched_deg = np.where(np.isnan(latched_deg), (true_deg, pairing.angles_deg), (edge_deg, latched_deg))
+    return true_deg, edge_deg, latched_deg, True
+
+
+def _readings(record: Record, wire: Wire) -> Iterator[TableReading]:
+    """Yield the answers to `L`; the table is looked at between the trigger and the question."""
+    on_the_way_s = wire.seconds(2) + wire.turnaround_s + wire.latency_s
+    looked_s = {each.column: each.time_s for each in record.observations if each.source == "inside"}
+    for each in record.observations:
+        if each.source == "L":
+            asked_s = looked_s.get(each.column, each.time_s)
+            yield TableReading(asked_s, asked_s + on_the_way_s, each.encoder_deg)
+
+
+def _joints_at(robot: RobotMotion, times_s: FloatArray) -> FloatArray:
+    """Return the joints `(n, 6)` at each time."""
+    return np.column_stack([np.interp(times_s, robot.times_s, robot.joints_deg[:, j]) for j in range(6)])
+
+
+def _why_nothing(triggers: list[Trigger], dropped: dict[int, Drop], failure: str | None) -> str:
+    if failure is not None:
+        return f"nothing was scanned: {failure}"
+    if not triggers:
+        return "nothing was scanned: the probe took no profile; its rate is too low for a scan this short"
+    reasons = [drop.value for drop in dropped.values()]
+    most = max(set(reasons), key=reasons.count)
+    return f"nothing was scanned: all {len(triggers)} profiles were dropped, most because {most}"

@@ -1,0 +1,114 @@
+"""A reference sphere as the probe sees it: simulated measurements for the two calibrations, in closed form."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.cell.cell import placement
+from planner.cell.scan_path import looking_at
+from planner.geometry.transforms import rigid_inverse, rotations_z
+from planner.scanning.alignment import Calibration
+from planner.scanning.calibration import AxisCalibration, calibrate_table_axis, sphere_centre
+from planner.scanning.probe import LaserProbe
+from planner.scanning.probe_calibration import ProbeCalibration, calibrate_probe
+
+_RADIUS_MM = 15.0
+# Where on the table the sphere stands for the axis; on it, turned by nothing, for the probe.
+_SEAT_T_MM = (120.0, 0.0, 60.0)
+_TABLE_ANGLES = 12
+# A sweep over the sphere, in steps of the probe across its line.
+_SWEEP_MM = np.linspace(-9.0, 9.0, 7)
+
+
+@dataclass(frozen=True, eq=False)
+class CellCalibration:
+    """What both procedures came to on one cell."""
+
+    axis: AxisCalibration
+    probe: ProbeCalibration
+    calibration: Calibration
+
+
+class Sweep(NamedTuple):
+    """Profiles of a sphere: the flange poses that they were taken from, and the points of each, in frame S."""
+
+    T_BF: FloatArray
+    points_S: list[FloatArray]
+
+
+def profile_of_sphere(
+    probe: LaserProbe, T_BS: FloatArray, centre_B: FloatArray, radius_mm: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return the points `(m, 3)` in frame S that a probe at T_BS measures of a sphere.
+
+    A camera sees what the laser strikes: nothing else is there, and beyond the incidence limit nothing is measured.
+    """
+    rays = probe.rays()
+    centre = (centre_B - T_BS[:3, 3]) @ T_BS[:3, :3]
+    along = rays @ centre
+    inside2 = along**2 - centre @ centre + radius_mm**2
+    with np.errstate(invalid="ignore"):
+        distances = along - np.sqrt(inside2)
+        cosines = np.sqrt(inside2) / radius_mm
+        depths = distances * rays[:, 2]
+        valid = cosines >= np.cos(np.radians(probe.incidence_limit_deg))
+        valid &= (depths >= probe.nearest_mm) & (depths <= probe.farthest_mm)
+    measured = distances + probe.noise_mm * rng.standard_normal(len(rays))
+    return np.asarray(measured[valid, np.newaxis] * rays[valid])
+
+
+def sweep(
+    probe: LaserProbe, views_BS: FloatArray, T_FS: FloatArray, centre_B: FloatArray, rng: np.random.Generator
+) -> Sweep:
+    """Return profiles of the sphere from each of the poses `(n, 4, 4)`, moved across the line in small steps."""
+    steps = np.stack([placement(0.0, step, 0.0, 0.0, 0.0, 0.0) for step in _SWEEP_MM])
+    poses = (views_BS[:, np.newaxis] @ steps).reshape(-1, 4, 4)
+    points = [profile_of_sphere(probe, T, centre_B, _RADIUS_MM, rng) for T in poses]
+    return Sweep(poses @ rigid_inverse(T_FS), points)
+
+
+def views_of(centre_B: FloatArray, count: int, probe: LaserProbe) -> FloatArray:
+    """Return probe poses `(count, 4, 4)` all round the upper side of a sphere, turned about their beams as well.
+
+    The sphere is off the line's middle and at varying depth: always in the middle, the probe turned round about its
+    beam would see the same, and at one depth a turn of the probe looks like a shift.
+    """
+    number = np.arange(count)
+    azimuth, polar = np.radians(137.508 * number), np.radians(10.0 + 60.0 * (number + 0.5) / count)
+    normals = np.column_stack((np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)))
+    roll = np.radians(77.0 * number)
+    lines = np.column_stack((np.cos(roll), np.sin(roll), 0.3 * np.ones(count)))
+    middle_mm, span_mm = 0.5 * (probe.nearest_mm + probe.farthest_mm), probe.farthest_mm - probe.nearest_mm
+    depths_mm = middle_mm + 0.2 * span_mm * np.cos(2.0 * number)
+    poses = looking_at(np.tile(centre_B, (count, 1)), normals, lines, 0.0)
+    poses[:, :3, 3] += (depths_mm + _RADIUS_MM)[:, np.newaxis] * normals
+    poses[:, :3, 3] += 10.0 * np.where(number % 3, 1.0, -1.0)[:, np.newaxis] * poses[:, :3, 0]
+    return poses
+
+
+def calibrate_cell(true: Calibration, nominal: Calibration, probe: LaserProbe, seed: int) -> CellCalibration:
+    """Return what the two calibrations come to on a cell, from simulated measurements with the probe's noise.
+
+    Args:
+        true: The placements that the measurements are made with.
+        nominal: What is known beforehand.
+        probe: The probe.
+        seed: Chooses its noise.
+    """
+    rng = np.random.default_rng((seed, 8))
+    centre = (true.T_BT @ np.array((*_SEAT_T_MM, 1.0)))[:3]
+    seen = sweep(probe, views_of(centre, 20, probe), true.T_FS, centre, rng)
+    on_flange = calibrate_probe(seen.T_BF, seen.points_S, _RADIUS_MM, nominal.T_FS, 3.0 * max(probe.noise_mm, 1e-3))
+
+    angles_deg = np.arange(_TABLE_ANGLES) * 360.0 / _TABLE_ANGLES
+    centres = []
+    for T_turn in rotations_z(angles_deg):
+        turned = (true.T_BT @ T_turn @ np.array((*_SEAT_T_MM, 1.0)))[:3]
+        views = sweep(probe, views_of(turned, 3, probe), true.T_FS, turned, rng)
+        T_BS = views.T_BF @ on_flange.T_FS
+        in_base = [points @ T[:3, :3].T + T[:3, 3] for T, points in zip(T_BS, views.points_S, strict=True)]
+        centres.append(sphere_centre(np.concatenate(in_base), _RADIUS_MM))
+    axis = calibrate_table_axis(np.array(centres), angles_deg, nominal.T_BT)
+    return CellCalibration(axis, on_flange, Calibration(on_flange.T_FS, axis.T_BT, nominal.T_TW))

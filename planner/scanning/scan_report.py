@@ -1,0 +1,142 @@
+"""A scan as one HTML file: verdict, cloud, error account, coverage, and what went missing."""
+
+from collections import Counter
+from collections.abc import Iterator
+
+from planner.page import heading, note, page, picture, table, verdict
+from planner.scanning.coverage import REASONS
+from planner.scanning.error_account import Account, Contribution
+from planner.scanning.probe import Sight
+from planner.scanning.scan_plots import STATE_NAMES, account_figure, cloud_figure, coverage_figure
+from planner.scanning.scan_run import COVERED_MM, Scanned
+
+_MICROMETRES = 1e3
+
+
+def scan_report(scanned: Scanned) -> str:
+    """Return the page of a scan."""
+    mesh, accounted = scanned.scan.mesh, scanned.account
+    blocks = (
+        verdict(verdict_of(scanned), scanned.is_whole),
+        table(("", ""), list(_summary(scanned)), words=True),
+        heading("The cloud"),
+        note("Grey is the part itself; colour is where it was measured, and how far the cloud lies from the surface."),
+        picture(cloud_figure(mesh, accounted), "the point cloud on the part, from two sides"),
+        table(("in micrometres", "mean", "sigma", "95 % within", "greatest"), [_distances(accounted)]),
+        heading("Where the error comes from"),
+        note(_explanation(scanned)),
+        picture(account_figure(accounted), "what each part contributes, and the distribution of the distances"),
+        _account_table(accounted),
+        note(_rounding(scanned)),
+        heading("Coverage"),
+        note(
+            f"A place counts as seen when a profile passes within {0.5 * COVERED_MM:g} mm and can measure it there."
+            " All of the surface counts, the underside too."
+        ),
+        picture(coverage_figure(mesh, scanned.coverage), "which places were seen, and why not the others"),
+        table(("of the surface", "share", "which means"), list(_coverage(scanned)), words=True),
+        heading("Calibration"),
+        _calibration(scanned),
+        heading("Profiles"),
+        table(("", ""), list(_profiles(scanned))),
+    )
+    return page(f"Scan of {scanned.scan.name}", blocks)
+
+
+def verdict_of(scanned: Scanned) -> str:
+    """Return what a scan came to in one sentence."""
+    accounted, seen = scanned.account, scanned.coverage.shares()[Sight.SEEN]
+    ended = ""
+    if scanned.run.failure is not None:
+        ended = f" It ended early: {scanned.run.failure}."
+    elif scanned.is_interrupted:
+        ended = " It was interrupted."
+    return (
+        f"{scanned.points:,} points from {len(scanned.run.numbers):,} profiles: {_um(accounted.distances.sigma)} µm"
+        f" (1 sigma) from the surface, {_um(accounted.total.displacement_mm)} µm (rms) from where they truly lie;"
+        f" {seen:.1%} of the surface seen.{ended}"
+    )
+
+
+def _um(length_mm: float, decimals: int = 1) -> str:
+    return f"{_MICROMETRES * length_mm:.{decimals}f}"
+
+
+def _summary(scanned: Scanned) -> Iterator[tuple[str, str]]:
+    plan, options = scanned.planned.plan, scanned.options
+    yield "planned by", f"{plan.planner}, {plan.configuration}"
+    yield "locations", f"{len(plan.angles_deg)}, one every {plan.step_s:g} s, {len(plan.pauses)} pauses"
+    yield "port", f"{options.port}, {options.baud} baud, {options.decimals} decimal(s)"
+    yield "probe", f"{options.triggers.rate_hz:g} profiles a second, {scanned.probe.points_per_line} points each"
+    yield "workpiece", f"{len(scanned.scan.mesh.faces):,} triangles"
+    yield "seed", f"{options.seed}"
+
+
+def _distances(accounted: Account) -> tuple[str, ...]:
+    name = f"cloud to mesh, {accounted.samples:,} points"
+    return (name, *(_um(value) for value in accounted.distances))
+
+
+def _explanation(scanned: Scanned) -> str:
+    text = (
+        "The same profiles, aligned anew with one contribution alone, and with all but one. Displacement is how far a"
+        " point is from where it truly lies on the part; across the surface is the share of it that shows as a distance"
+        " from the mesh: where a surface is round about the table's axis, or lies across it, a wrong angle moves its"
+        " points along it, and the distance does not tell. Contributions that depend on one another, as a constant"
+        " backlash and the rounding of the same angle may, make the sum of the squares differ from all together."
+    )
+    if not scanned.run.tells_truth:
+        text += " This port does not tell the table's true angle, so the table's own contributions are missing."
+    return text
+
+
+def _account_table(accounted: Account) -> str:
+    def row(name: str, part: Contribution) -> tuple[str, ...]:
+        return name, *(_um(value, 2) for value in part)
+
+    rows = [row(str(name), part) for name, part in accounted.parts.items()]
+    rows += [
+        ("all together", _um(accounted.total.displacement_mm, 2), _um(accounted.total.across_mm, 2), ""),
+        ("root of the sum of squares", _um(accounted.sum_mm, 2), "", ""),
+        ("all switched off", f"{_MICROMETRES * accounted.none_mm:.1g}", "", ""),
+    ]
+    return table(("rms, in micrometres", "displacement alone", "across the surface", "left without it"), rows, 3)
+
+
+def _rounding(scanned: Scanned) -> str:
+    accounted, decimals = scanned.account, scanned.options.decimals
+    return (
+        f"Rounding in closed form: an angle that is wrong by anything within one step of {10.0**-decimals:g} deg has"
+        f" sigma {10.0**-decimals:g}/sqrt(12) deg, which at these points' radius of {accounted.radius_mm:.1f} mm (rms)"
+        f" is {_um(accounted.rounding_mm, 2)} µm."
+    )
+
+
+def _coverage(scanned: Scanned) -> Iterator[tuple[str, str, str]]:
+    shares = scanned.coverage.shares()
+    for code in sorted(Sight, reverse=True):
+        _, _, meaning = REASONS.get(code, "").partition(": ")
+        yield STATE_NAMES[code], f"{shares[code]:.1%}", meaning
+
+
+def _calibration(scanned: Scanned) -> str:
+    axis, probe = scanned.knowledge.axis, scanned.knowledge.probe
+    if axis is None or probe is None:
+        return note("The placements of the scan file were taken as exactly known.")
+    rows = [
+        ("table axis", _um(axis.rms_mm), f"{len(axis.residuals_mm)} sphere centres", ""),
+        (
+            "probe on the flange", _um(probe.rms_mm), f"{len(probe.residuals_mm):,} points",
+            f"{_um(probe.uncertainty_mm)} µm, {1e3 * probe.uncertainty_deg:.1f} mdeg"
+            f"; {probe.wrong_starts} of {probe.starts} starts ended in a false minimum",
+        ),
+    ]  # fmt: skip
+    return table(("", "residual (µm, rms)", "from", "uncertainty (1 sigma)"), rows, words=True)
+
+
+def _profiles(scanned: Scanned) -> Iterator[tuple[str, str]]:
+    run = scanned.run
+    yield "taken along the path", f"{run.triggers:,}"
+    yield "with a robot pose and a table angle", f"{len(run.numbers):,}"
+    for reason, number in Counter(drop.value for drop in run.dropped.values()).items():
+        yield f"dropped: {reason}", f"{number:,}"

@@ -1,0 +1,257 @@
+"""A scan from end to end: plan, move and latch, measure, align, write, account.
+
+The workpiece is measured where it truly is, at the table's true angle, and aligned with what was latched: the
+difference is the error that the account takes apart.
+"""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple, Self
+
+import numpy as np
+import trimesh
+
+from planner.arrays import FloatArray
+from planner.cell.cell import Cell, placement
+from planner.cell.scan import Scan
+from planner.errors import PlannerError
+from planner.execution.inside_view import ControlView
+from planner.execution.table_port import open_port
+from planner.geometry.ray_casting import RayCaster
+from planner.kinematics.configuration import Configuration
+from planner.map.map_builder import build_maps
+from planner.map.map_problem import map_problem
+from planner.planning.arm_motion import arm_motion
+from planner.planning.best_configuration import best_configuration
+from planner.planning.plan import Plan
+from planner.planning.planners import DEFAULT_PLANNER, PLANNERS
+from planner.planning.problem import Problem
+from planner.progress import Progress
+from planner.scanning.alignment import Calibration, aligned, probe_poses
+from planner.scanning.calibration import AxisCalibration
+from planner.scanning.coverage import Coverage
+from planner.scanning.error_account import Account, Chain, Samples, account
+from planner.scanning.latched_run import LatchedRun, TriggerConditions, run_latched
+from planner.scanning.point_cloud import PlyWriter, XyzWriter
+from planner.scanning.probe import LaserProbe, measure
+from planner.scanning.probe_calibration import ProbeCalibration
+from planner.scanning.reference_sphere import calibrate_cell
+from planner.scanning.trigger_line import ProbeByHand, ProbeOnPort, TriggerLine
+from planner.table.motion import Limits
+from planner.table.wire import Wire
+from protocol import TableClient
+
+# Profiles that are measured at once: some 40 000 points.
+_BLOCK = 64
+# Profiles that are nearer to one another leave no gap.
+COVERED_MM = 2.0
+
+ProgressOf = Callable[[str], Progress | None]
+"""Gives the progress of a kind of work."""
+
+
+class ScanError(PlannerError):
+    """A scan that cannot be carried out."""
+
+
+class ScanOptions(NamedTuple):
+    """How a scan is carried out; see the options of `python -m planner scan`."""
+
+    port: str = "emulator://"
+    baud: int = 9600
+    decimals: int = 1
+    timeout_s: float = 0.5
+    control: Path | None = None
+    time_scale: float = 1.0
+    configuration: str = "best"
+    angle_count: int = 360
+    exact_calibration: bool = False
+    xyz: bool = False
+    probe: LaserProbe | None = None
+    triggers: TriggerConditions = TriggerConditions()
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """The motion of a scan: the table's plan, and the arm's joints `(n + 1, 6)` in deg along it."""
+
+    plan: Plan
+    joints_deg: FloatArray
+    limits: Limits
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """What the alignment knows of the cell, and from which measurements."""
+
+    calibration: Calibration
+    axis: AxisCalibration | None = None
+    probe: ProbeCalibration | None = None
+
+    @classmethod
+    def of(cls, cell: Cell, probe: LaserProbe, exact: bool, seed: int) -> Self:
+        """Return the cell's own placements, or what the calibrations find from a drawing that is some mm off."""
+        true = Calibration.of(cell)
+        if exact:
+            return cls(true)
+        off = placement(1.0, -1.5, 0.0, 0.0, 0.0, 0.0) @ placement(0.0, 0.0, 0.0, 30.0, 0.5, -30.0)
+        found = calibrate_cell(true, Calibration(true.T_FS @ off, true.T_BT, true.T_TW), probe, seed)
+        return cls(found.calibration, found.axis, found.probe)
+
+
+@dataclass(frozen=True, eq=False)
+class Scanned:
+    """What a scan came to."""
+
+    scan: Scan
+    options: ScanOptions
+    probe: LaserProbe
+    planned: Planned
+    knowledge: Knowledge
+    run: LatchedRun
+    points: int
+    coverage: Coverage
+    account: Account
+    is_interrupted: bool
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the motion and the measuring came to their ends."""
+        return self.run.failure is None and not self.is_interrupted
+
+
+def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: ProgressOf) -> Planned:
+    """Return the best motion for a scan.
+
+    Raises:
+        ScanError: There is none, or the arm cannot follow it.
+    """
+    asked = list(Configuration) if configuration == "best" else [Configuration.parse(configuration)]
+    maps = build_maps(map_problem(scan, progress("distance field")), asked, angle_count, progress("map"))
+    limits = scan.limits
+    weights = scan.weights
+    problems = {each.label: Problem(map_, scan.path.step_s, limits, weights) for each, map_ in maps.items()}
+    comparison = best_configuration(problems, PLANNERS[DEFAULT_PLANNER])
+    if comparison.best is None:
+        raise ScanError(f"{scan.name}: there is no plan; python -m planner plan {scan.name} tells why")
+    plan = comparison.outcomes[comparison.best]
+    assert isinstance(plan, Plan)
+    joints = arm_motion(scan, Configuration.parse(comparison.best), plan)
+    if joints.step is not None:
+        raise ScanError(f"{scan.name}: the arm cannot follow the plan at location {joints.step}; scan it more slowly")
+    return Planned(plan, np.degrees(joints.joints), limits)
+
+
+def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) -> LatchedRun:
+    """Return what was latched while the table at the port made the motion.
+
+    Raises:
+        PlannerError: The port lets no trigger through, the commands do not fit it, or nothing was scanned.
+        TableError: The table does not answer, or did not come to the start.
+    """
+    wire = Wire(options.decimals, options.baud)
+    port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
+    with ExitStack() as open_things:
+        timeout_s = options.timeout_s * options.time_scale
+        table = open_things.enter_context(TableClient(port, timeout_s, options.decimals))
+        line = _trigger_line(port, table, options, open_things)
+        return run_latched(
+            table, line, planned.plan, planned.joints_deg, planned.limits, wire, options.triggers, progress("motion")
+        )
+
+
+def _trigger_line(port: object, table: TableClient, options: ScanOptions, open_things: ExitStack) -> TriggerLine:
+    simulated = getattr(port, "table", None)
+    conditions = options.triggers
+    if simulated is not None:
+        return ProbeOnPort(simulated, conditions.rate_hz, conditions.delay_s, conditions.faults, conditions.seed)
+    if options.control is None:
+        raise ScanError(
+            f"{options.port}: the simulated probe has no line to trigger this table;"
+            " use emulator://, or a stand-in with its --control channel"
+        )
+    view = ControlView(options.control)
+    open_things.callback(view.close)
+    return ProbeByHand(view, table.clock)
+
+
+def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: ProgressOf) -> Scanned:
+    """Carry a scan out, write its cloud to `out`, and return what it came to.
+
+    Whatever interrupts it, what was scanned until then is written.
+
+    Raises:
+        PlannerError: It cannot be carried out, or nothing was scanned.
+        TableError: The table does not answer.
+        OSError: The folder cannot be written.
+    """
+    probe = options.probe or LaserProbe.of(scan.cell.probe)
+    if options.triggers.rate_hz > probe.line_rate_hz:
+        raise ScanError(
+            f"a rate of {options.triggers.rate_hz:g} profiles a second is beyond the probe's {probe.line_rate_hz:g}"
+        )
+    knowledge = Knowledge.of(scan.cell, probe, options.exact_calibration, options.seed)
+    planned = plan_scan(scan, options.configuration, options.angle_count, progress)
+    out.mkdir(parents=True, exist_ok=True)
+    run = run_on_port(planned, options, progress)
+    chain = Chain(
+        run, Calibration.of(scan.cell), knowledge.calibration, lambda deg: scan.cell.arm.flange_poses(np.radians(deg))
+    )
+    work = _Measuring(scan.mesh, probe, chain, options)
+    with ExitStack() as files:
+        ply = files.enter_context(PlyWriter(out / "cloud.ply", f"seventh-axis scan {scan.name}, seed {options.seed}"))
+        xyz = files.enter_context(XyzWriter(out / "cloud.xyz")) if options.xyz else None
+        came_to_its_end = work.go(ply, xyz, progress("profiles"))
+    if not ply.count:
+        (out / "cloud.ply").unlink()
+        (out / "cloud.xyz").unlink(missing_ok=True)
+        raise ScanError(f"nothing was scanned: none of {len(run.numbers)} profiles meets the workpiece")
+    accounted = account(chain, work.samples.all(), scan.mesh, 10.0**-options.decimals)
+    return Scanned(
+        scan, options, probe, planned, knowledge, run, ply.count, work.coverage, accounted, not came_to_its_end
+    )
+
+
+class _Measuring:
+    """The profiles of a run, block by block, from the probe to the cloud."""
+
+    def __init__(self, mesh: trimesh.Trimesh, probe: LaserProbe, chain: Chain, options: ScanOptions) -> None:
+        self.samples = Samples()
+        caster = RayCaster(mesh)
+        self.coverage = Coverage(mesh, caster, probe, COVERED_MM)
+        self._caster, self._probe, self._chain, self._seed = caster, probe, chain, options.seed
+
+    def go(self, ply: PlyWriter, xyz: XyzWriter | None, progress: Progress | None) -> bool:
+        """Measure, align and write all profiles; return False when Ctrl-C came before the last."""
+        total = len(self._chain.run.numbers)
+        true_T_WS, known_T_WS = self._chain.poses(()), self._known_poses()
+        try:
+            for first in range(0, total, _BLOCK):
+                block = slice(first, first + _BLOCK)
+                self._measure(first, true_T_WS[block], known_T_WS[block], ply, xyz)
+                if progress is not None:
+                    progress(min(first + _BLOCK, total), total)
+        except KeyboardInterrupt:
+            return False
+        return True
+
+    def _known_poses(self) -> FloatArray:
+        """Return T_WS `(n, 4, 4)` from what was latched and calibrated alone."""
+        run, chain = self._chain.run, self._chain
+        return probe_poses(chain.known, chain.flange_poses(run.joints_deg), run.angles_deg)
+
+    def _measure(
+        self, first: int, true_T_WS: FloatArray, known_T_WS: FloatArray, ply: PlyWriter, xyz: XyzWriter | None
+    ) -> None:
+        numbers = self._chain.run.numbers[first : first + len(true_T_WS)]
+        seen = measure(self._caster, self._probe, true_T_WS, numbers, self._seed)
+        points = aligned(known_T_WS, seen.profiles, seen.points_S)
+        beams = np.einsum("ijk,ik->ij", known_T_WS[seen.profiles, :3, :3], seen.rays_S)
+        ply.write(points, beams, numbers[seen.profiles])
+        if xyz is not None:
+            xyz.write(points)
+        self.samples.take(first, seen)
+        self.coverage.take(true_T_WS)

@@ -1,0 +1,118 @@
+"""What the serial line allows: which numbers can be said, and how long saying them takes."""
+
+import math
+from decimal import Decimal
+from typing import NamedTuple
+
+from planner.errors import PlannerError
+from planner.table.motion import Limits
+from planner.table.velocity_profile import MotionCommand
+from protocol import Command, Ok, Verb, encode_command, encode_reply
+
+
+class StreamError(PlannerError):
+    """A motion that cannot be said to the table as commands."""
+
+
+class Wire(NamedTuple):
+    """What the commands have to pass.
+
+    Attributes:
+        decimals: places after the point.
+        baud: 10 bits a byte; 0 where bytes take no time.
+        turnaround_s: from the end of a command to the start of the next beyond the time of the bytes: what driver,
+            adapter and operating system take.
+        latency_s: from the arrival of a CR to its effect: a tick of the firmware, and clocks that tell whole ticks.
+    """
+
+    decimals: int = 1
+    baud: int = 9600
+    turnaround_s: float = 0.002
+    latency_s: float = 0.0015
+
+    @property
+    def quantum(self) -> float:
+        """The smallest difference of two numbers."""
+        return float(10.0**-self.decimals)
+
+    def seconds(self, byte_count: int) -> float:
+        """Return how long bytes take."""
+        return 10.0 * byte_count / self.baud if self.baud else 0.0
+
+
+def exchanges_s(wire: Wire, command: MotionCommand, before: MotionCommand | None = None) -> float:
+    """Return how long the commands of one step take with their replies, and the reading of the latch.
+
+    An S or an A that is the same as `before` is not sent again.
+    """
+    lines = [encode_command(Command(Verb.READ_LATCH)), command_line(Verb.MOVE_TO, command.target_deg, wire)]
+    if before is None or command.speed_deg_s != before.speed_deg_s:
+        lines.append(command_line(Verb.SET_SPEED, command.speed_deg_s, wire))
+    if before is None or command.acceleration_deg_s2 != before.acceleration_deg_s2:
+        lines.append(command_line(Verb.SET_ACCELERATION, command.acceleration_deg_s2, wire))
+    # The latch is answered with an angle about as long as P's own line, the others with OK.
+    replies = len(lines[1]) + (len(lines) - 1) * len(encode_reply(Ok()))
+    return wire.seconds(sum(map(len, lines)) + replies) + wire.turnaround_s * len(lines)
+
+
+def command_line(verb: Verb, value: float, wire: Wire) -> bytes:
+    """Return a command as the wire carries it."""
+    return encode_command(Command(verb, Decimal(repr(value))), wire.decimals)
+
+
+class Grid:
+    """The numbers that a wire can say, within the limits.
+
+    Attributes:
+        quantum: the smallest difference of two numbers.
+    """
+
+    def __init__(self, limits: Limits, wire: Wire) -> None:
+        """Take the numbers of `wire`; StreamError where none is within the limits."""
+        self.quantum = wire.quantum
+        self._decimals = wire.decimals
+        self._most_speed = self._whole(limits.speed_deg_s)
+        self._most_rate = self._whole(limits.acceleration_deg_s2)
+        if not (self._most_speed and self._most_rate):
+            raise StreamError(
+                f"the table's limits are {limits.speed_deg_s:g} deg/s and {limits.acceleration_deg_s2:g} deg/s2;"
+                f" with {wire.decimals} decimals both must be at least {self.quantum:g}"
+            )
+
+    def nearest(self, value: float) -> float:
+        """Return the number nearest to a value."""
+        return self._number(round(value / self.quantum))
+
+    def speed(self, value: float) -> float:
+        """Return the allowed S nearest to a speed."""
+        return self._number(min(max(round(value / self.quantum), 1), self._most_speed))
+
+    def rate(self, value: float) -> float:
+        """Return the allowed A nearest to a rate."""
+        return self._number(min(max(round(value / self.quantum), 1), self._most_rate))
+
+    def rates_around(self, value: float) -> tuple[float, float]:
+        """Return the allowed A next below and above a rate."""
+        below = math.floor(min(value / self.quantum, self._most_rate))
+        return self.rate(below * self.quantum), self.rate((below + 1) * self.quantum)
+
+    def speeds_around(self, speed_deg_s: float, count: int) -> list[float]:
+        """Return the allowed speeds, signed and without 0, within `count` numbers of one."""
+        middle = round(speed_deg_s / self.quantum)
+        most = self._most_speed
+        return [self._number(n) for n in range(middle - count, middle + count + 1) if n and -most <= n <= most]
+
+    def beyond(self, angle_deg: float, forward: float) -> float:
+        """Return the nearest number that is beyond an angle, in the direction `forward` (1 or -1)."""
+        return self._number(int(forward * (math.floor(forward * angle_deg / self.quantum + 1e-6) + 1)))
+
+    def command(self, command: MotionCommand) -> MotionCommand:
+        """Return the nearest command that the wire can say."""
+        target, speed, rate = command
+        return MotionCommand(self.nearest(target), self.speed(speed), self.rate(rate))
+
+    def _whole(self, limit: float) -> int:
+        return math.floor(limit / self.quantum + 1e-6)
+
+    def _number(self, n: int) -> float:
+        return round(n * self.quantum, self._decimals)

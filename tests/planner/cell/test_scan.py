@@ -1,0 +1,148 @@
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from planner.cell.scan import load_scan, shipped_scans
+from planner.errors import PlannerError, ScanFileError, WorkpieceError
+from planner.kinematics.inverse_kinematics import inverse_kinematics
+from planner.reasons import Reason
+
+SCANS = Path(__file__).parents[3] / "planner" / "scans"
+
+
+def changed(folder: Path, name: str, old: str, new: str) -> Path:
+    """Return a copy of a shipped scan in which one text is replaced."""
+    text = (SCANS / f"{name}.toml").read_text()
+    assert old in text
+    file = folder / "scan.toml"
+    file.write_text(text.replace(old, new, 1))
+    return file
+
+
+def test_four_scans_are_shipped() -> None:
+    assert shipped_scans() == ["cylinder", "mould", "mould-crossed", "sphere"]
+
+
+@pytest.mark.parametrize("name", shipped_scans())
+def test_a_shipped_scan_has_about_a_hundred_locations_each_reached_at_some_table_angle(name: str) -> None:
+    scan = load_scan(name)
+    assert scan.name == name
+    assert 90 <= scan.path.count <= 110
+    goals = scan.cell.goal_flange_poses(scan.path.T_WS, np.arange(0.0, 360.0, 10.0))
+    _, reasons = inverse_kinematics(scan.cell.arm, goals.reshape(-1, 4, 4))
+    reached = (reasons == Reason.REACHED).reshape(*goals.shape[:2], 8)
+    assert reached.any(axis=1).all(axis=0).any(), "no configuration reaches every location"
+    assert not reached.all(axis=1).all(axis=0).any(), "the map of some configuration forbids nothing"
+
+
+@pytest.mark.parametrize("name", ["sphere", "cylinder"])
+def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
+    scan = load_scan(name)
+    goals = scan.cell.goal_flange_poses(scan.path.T_WS, np.arange(0.0, 360.0, 5.0))
+    _, reasons = inverse_kinematics(scan.cell.arm, goals.reshape(-1, 4, 4))
+    reached = (reasons == Reason.REACHED).reshape(*goals.shape[:2], 8)
+    assert not reached.all(axis=0).any(), "one table angle serves the whole path"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "diameter_mm = 160",
+            "diameter_cm = 16",
+            "workpiece.diameter_mm is missing; it must be a finite number above 0",
+        ),
+        ("diameter_mm = 160", "diameter_mm = 160\ncolour = 1", "workpiece.colour is not a known key; known are class,"),
+        (
+            "diameter_mm = 160",
+            "diameter_mm = -160",
+            "workpiece.diameter_mm is -160; it must be a finite number above 0",
+        ),
+        ("diameter_mm = 160", 'diameter_mm = "160"', "workpiece.diameter_mm is '160'; it must be a finite number"),
+        ("diameter_mm = 160", "diameter_mm = true", "workpiece.diameter_mm is True"),
+        ("diameter_mm = 160", "diameter_mm = nan", "workpiece.diameter_mm is nan"),
+        (
+            "overlap = 0.2",
+            "overlap = 1.5",
+            "path.overlap is 1.5; it must be a finite number at least 0 and at most 0.9",
+        ),
+        ('"meridians"', '"zigzag"', "path.pattern is 'zigzag'; it must be one of meridians, spiral"),
+        ('"sphere"', '"egg"', "workpiece.class is 'egg'; it must be one of cylinder, mould, sphere"),
+        ("[0, 0, 60, 0, 0, 0]", "[0, 0, 60]", "cell.workpiece_on_table is [0, 0, 60]; it must be a list of 6"),
+        (
+            "lowest_polar_deg = 85",
+            "lowest_polar_deg = 5",
+            "path.lowest_polar_deg is 5; it must be a finite number above 10",
+        ),
+        ("comfortable_clearance_mm = 30", "comfortable_clearance_mm = 4", "the first must be the smaller"),
+        ("0.2, 0.2]", "0.2, -1]", "needed are 8 finite numbers"),
+        ("table_speed_deg_s = 40", "table_speed_deg_s = 0", "limits.table_speed_deg_s is 0; it must be"),
+        ("[limits]", "[limit]", "limit is not a known key; known are cell, limits, path, value, weights, workpiece"),
+        ("[limits]", "[limits", "not a TOML file"),
+        (
+            "diameter_mm = 160",
+            "diameter_mm = 0.16",
+            "longest side is 0.16 mm; allowed is 10 to 1000 mm; is it in metres?",
+        ),
+        ("diameter_mm = 160", "diameter_mm = 510", "reaches 255.0 mm from the table's axis"),
+        ("[0, 0, 60, 0, 0, 0]", "[0, 0, -60, 0, 0, 0]", "reaches 60.0 mm below the table's top"),
+        ("[cell]", "[cell.probe]\nstand_off_mm = 250\n[cell]", "cell.probe.stand_off_mm is 250; it must be"),
+        ("[cell]", "[cell.probe]\nnearest_mm = 300\n[cell]", "cell.probe.farthest_mm is missing; it must be"),
+    ],
+)
+def test_a_wrong_key_unit_or_range_is_refused_with_file_key_and_what_is_allowed(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    file = changed(tmp_path, "sphere", old, new)
+    with pytest.raises(PlannerError, match=re.escape(message)) as refusal:
+        load_scan(file)
+    assert str(refusal.value).startswith(f"{file}: ")
+
+
+def test_a_name_that_is_neither_shipped_nor_a_file_is_refused_with_the_shipped_ones() -> None:
+    with pytest.raises(ScanFileError, match="cylinder, mould, mould-crossed, sphere"):
+        load_scan("cone")
+
+
+def test_arm_limits_in_the_wrong_order_are_refused(tmp_path: Path) -> None:
+    arm = (SCANS.parent / "arms" / "viper_s650.toml").read_text()
+    (tmp_path / "arm.toml").write_text(arm.replace("[-190, 45]", "[45, -190]"))
+    file = changed(tmp_path, "sphere", '"viper_s650"', '"arm.toml"')
+    with pytest.raises(PlannerError, match=r"limits of joint 2 are 45..-190 deg; the lower must come first") as refusal:
+        load_scan(file)
+    assert str(refusal.value).startswith(f"{file}: ")
+
+
+def test_a_mesh_is_scanned_by_its_measured_dimensions(tmp_path: Path) -> None:
+    load_scan("cylinder").mesh.export(tmp_path / "part.stl")
+    file = changed(tmp_path, "cylinder", "diameter_mm = 140\nheight_mm = 180", 'mesh = "part.stl"')
+    np.testing.assert_allclose(load_scan(file).path.T_WS, load_scan("cylinder").path.T_WS, atol=0.2)
+
+
+def test_a_mesh_of_no_class_is_scanned_along_a_path_from_a_file(tmp_path: Path) -> None:
+    trimesh.creation.box((80.0, 80.0, 80.0)).apply_translation((0.0, 0.0, 40.0)).export(tmp_path / "part.stl")
+    (tmp_path / "path.csv").write_text("0,0,230,0,180,0\n20,0,230,0,180,0\n")
+    text = '[workpiece]\nmesh = "part.stl"\n[path]\nfile = "path.csv"\ntime_step_s = 0.5\n'
+    (tmp_path / "scan.toml").write_text(text)
+    scan = load_scan(tmp_path / "scan.toml")
+    assert scan.workpiece is None
+    assert scan.path.count == 2
+
+
+def test_a_mesh_of_no_class_needs_a_path_file(tmp_path: Path) -> None:
+    trimesh.creation.box((80.0, 80.0, 80.0)).apply_translation((0.0, 0.0, 40.0)).export(tmp_path / "part.stl")
+    (tmp_path / "scan.toml").write_text('[workpiece]\nmesh = "part.stl"\n[path]\ntime_step_s = 0.5\n')
+    with pytest.raises(ScanFileError, match=r"path.file is missing; it must be a path file"):
+        load_scan(tmp_path / "scan.toml")
+
+
+def test_a_fault_of_the_mesh_names_both_files(tmp_path: Path) -> None:
+    trimesh.creation.box((0.08, 0.08, 0.08)).export(tmp_path / "part.stl")
+    file = changed(tmp_path, "cylinder", "diameter_mm = 140\nheight_mm = 180", 'mesh = "part.stl"')
+    with pytest.raises(WorkpieceError, match="is it in metres") as refusal:
+        load_scan(file)
+    assert "scan.toml" in str(refusal.value)
+    assert "part.stl" in str(refusal.value)

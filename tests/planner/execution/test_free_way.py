@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+
+from planner.execution.free_way import WayError, check_ends, is_free, nearest_turns, turns_to_start
+from planner.execution.table_motion import TableMotion
+from planner.map.config_map import ConfigurationMap
+from planner.map.synthetic_maps import blocks_map
+from planner.planning.plan import Plan, make_plan
+from planner.planning.problem import Problem
+from planner.table.motion import Limits, roll_out
+
+
+@pytest.fixture
+def walled() -> ConfigurationMap:
+    """Forbidden from 100 to 120 degrees at every location."""
+    return blocks_map(8, 360, [(0, 7, 100, 120)], edge=0)
+
+
+def test_a_way_is_free_only_where_no_sample_on_it_or_beside_it_is_forbidden(walled: ConfigurationMap) -> None:
+    assert is_free(walled, 0, 50.0, 99.0)
+    assert not is_free(walled, 0, 50.0, 99.5)
+    assert not is_free(walled, 0, 90.0, 130.0)
+    assert is_free(walled, 0, 121.0, 459.0)
+    assert not is_free(walled, 0, -270.0, -230.0)
+
+
+def test_the_start_is_reached_the_short_way_where_that_is_free(walled: ConfigurationMap) -> None:
+    assert turns_to_start(walled, 90.0, 20.0) == 0
+    assert turns_to_start(walled, 710.0, 20.0) == 2
+    assert turns_to_start(walled, -350.0, 20.0) == -1
+
+
+def test_the_start_is_reached_the_other_way_round_where_the_short_one_is_not_free(walled: ConfigurationMap) -> None:
+    assert nearest_turns(90.0, 130.0) == 0
+    assert turns_to_start(walled, 90.0, 130.0) == -1
+    assert turns_to_start(walled, 130.0, 90.0) == 1
+
+
+def test_without_a_free_way_nothing_is_moved() -> None:
+    walled_twice = blocks_map(8, 360, [(0, 7, 100, 120), (0, 7, 200, 220)], edge=0)
+    with pytest.raises(WayError, match="draw the arm back, and say so with --arm-away"):
+        turns_to_start(walled_twice, 0.0, 150.0)
+
+
+def moving(angle_deg: float, speed_deg_s: float, configuration_map: ConfigurationMap) -> TableMotion:
+    angles, speeds = roll_out(angle_deg, speed_deg_s, np.zeros(7), 0.1)
+    plan: Plan = make_plan(Problem(configuration_map), "by hand", angles, speeds, np.zeros(7))
+    return TableMotion(plan, Limits())
+
+
+@pytest.mark.parametrize(
+    ("angle_deg", "speed_deg_s", "what"),
+    [(84.0, 20.0, "the stop at location 7 takes the table"), (121.5, 20.0, "the run-up at location 0 takes the table")],
+)
+def test_a_run_up_or_a_stop_through_a_forbidden_region_is_refused(
+    walled: ConfigurationMap, angle_deg: float, speed_deg_s: float, what: str
+) -> None:
+    with pytest.raises(WayError, match=what):
+        check_ends(walled, moving(angle_deg, speed_deg_s, walled))
+
+
+def test_free_ends_are_accepted(walled: ConfigurationMap) -> None:
+    check_ends(walled, moving(30.0, 20.0, walled))

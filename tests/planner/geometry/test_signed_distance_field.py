@@ -1,0 +1,173 @@
+import math
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from planner.geometry.signed_distance_field import (
+    SignedDistanceField,
+    build_field,
+    cached_field,
+    field_distance,
+    look_up,
+)
+
+SPACING_MM = 4.0
+HALF_DIAGONAL_MM = SPACING_MM * 3**0.5 / 2
+coordinate = st.integers(-70, 70).map(float)
+point = st.tuples(coordinate, coordinate, coordinate)
+
+
+@cache
+def mould() -> trimesh.Trimesh:
+    """A short tube: concave, with sharp edges."""
+    mesh: trimesh.Trimesh = trimesh.creation.annulus(r_min=25.0, r_max=50.0, height=40.0, sections=24)
+    return mesh
+
+
+@cache
+def field() -> SignedDistanceField:
+    return build_field(mould(), SPACING_MM)
+
+
+def exact_distances(points: NDArray[np.float64], mesh: trimesh.Trimesh | None = None) -> NDArray[np.float64]:
+    mesh = mesh or mould()
+    return -np.asarray(trimesh.proximity.signed_distance(mesh, points))  # type: ignore[no-untyped-call]  # no types
+
+
+def walked(a: tuple[float, ...], b: tuple[float, ...], enough_mm: float = math.inf) -> float:
+    (ax, ay, az), (bx, by, bz) = a, b
+    return field_distance(*field(), ax, ay, az, bx, by, bz, enough_mm)
+
+
+def hollow_box() -> trimesh.Trimesh:
+    hole = trimesh.creation.icosphere(subdivisions=2, radius=20.0)
+    hole.invert()
+    return joined(trimesh.creation.box((60.0, 60.0, 60.0)), hole)
+
+
+def joined(*shells: trimesh.Trimesh) -> trimesh.Trimesh:
+    mesh = trimesh.util.concatenate(shells)
+    assert isinstance(mesh, trimesh.Trimesh)
+    return mesh
+
+
+PARTS: dict[str, Callable[[], trimesh.Trimesh]] = {
+    "convex": lambda: trimesh.creation.icosphere(subdivisions=3, radius=30.0),
+    "concave": mould,
+    "round and concave": lambda: trimesh.creation.torus(40.0, 12.0, 16, 12),
+    "thinner than the spacing": lambda: trimesh.creation.box((60.0, 50.0, 1.5)),
+    "walls on the grid's lines": lambda: trimesh.creation.box((40.0, 32.0, 24.0)),
+    "hollow": hollow_box,
+}
+
+
+def grid_points(field: SignedDistanceField) -> NDArray[np.float64]:
+    return field.origin_mm + field.spacing_mm * np.moveaxis(np.indices(field.values_mm.shape), 0, -1).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("turned_deg", [0.0, 35.0])
+def test_the_grid_holds_the_distance_that_trimesh_finds(part: str, turned_deg: float) -> None:
+    mesh = PARTS[part]().copy()
+    turn = np.eye(4)
+    turn[:3, :3] = Rotation.from_rotvec([turned_deg, 0.3 * turned_deg, 0.7 * turned_deg], degrees=True).as_matrix()
+    mesh.apply_transform(turn)
+    built = build_field(mesh, SPACING_MM)
+    rng = np.random.default_rng(0)
+    chosen = rng.permutation(built.values_mm.size)[:1500]
+    exact = exact_distances(grid_points(built)[chosen], mesh)
+    excess = built.values_mm.ravel()[chosen] - exact
+    assert excess.max() <= 1e-4
+    assert excess.min() >= -0.002 * SPACING_MM
+
+
+def test_what_two_overlapping_shells_share_is_inside() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=20.0)
+    both = joined(ball, ball.copy().apply_translation((15.0, 0.0, 0.0)))
+    assert look_up(*build_field(both, SPACING_MM), 7.5, 0.0, 0.0) < 0.0
+
+
+def test_within_its_grid_a_field_is_half_a_cell_off_at_most() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform([-50.0, -50.0, -20.0], [50.0, 50.0, 20.0], (2000, 3))
+    exact = exact_distances(points)
+    ours = np.array([look_up(*field(), *map(float, p)) for p in points])
+    assert np.abs(ours - exact).max() <= HALF_DIAGONAL_MM
+    assert np.median(np.abs(ours - exact)) < 0.05 * SPACING_MM
+
+
+def test_beyond_its_grid_a_field_never_promises_too_much() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-300, 300, (2000, 3))
+    exact = exact_distances(points)
+    ours = np.array([look_up(*field(), *map(float, p)) for p in points])
+    assert (ours <= exact + HALF_DIAGONAL_MM).all()
+    assert (exact - ours <= field().values_mm.max() + HALF_DIAGONAL_MM).all()
+
+
+@settings(deadline=None)
+@given(a=point, b=point)
+def test_a_segment_is_never_nearer_than_the_field_says(a: tuple[float, ...], b: tuple[float, ...]) -> None:
+    exact = exact_distances(np.linspace(a, b, 100))
+    ours = walked(a, b)
+    assert ours <= exact.min()
+
+
+def test_every_walk_ends_at_the_least_distance_that_it_met() -> None:
+    rng = np.random.default_rng(0)
+    for a, b in rng.uniform(-60.0, 60.0, (2000, 2, 3)):
+        along = np.linspace(a, b, 50)
+        met = min(look_up(*field(), *map(float, p)) for p in along)
+        assert walked(tuple(a), tuple(b), 30.0) <= met
+        assert walked(tuple(a), tuple(b), 30.0) >= min(met, 30.0) - 2.0 * SPACING_MM
+
+
+@settings(deadline=None)
+@given(a=point, b=point, enough_mm=st.floats(-10, 60))
+def test_a_bound_keeps_what_is_below_it(a: tuple[float, ...], b: tuple[float, ...], enough_mm: float) -> None:
+    exact, bounded = walked(a, b), walked(a, b, enough_mm)
+    if exact < enough_mm - 0.25 * SPACING_MM:
+        assert bounded == pytest.approx(exact, abs=0.25 * SPACING_MM)
+    else:
+        assert bounded >= enough_mm - 0.5 * SPACING_MM
+
+
+def test_a_field_is_built_once_and_read_back_the_same(tmp_path: Path) -> None:
+    mesh = trimesh.creation.box((20, 30, 40))
+    calls: list[tuple[int, int]] = []
+    built = cached_field(mesh, 5.0, lambda *done: calls.append(done), tmp_path)
+    assert calls[-1][0] == calls[-1][1] == built.values_mm.size
+    calls.clear()
+    read = cached_field(mesh, 5.0, lambda *done: calls.append(done), tmp_path)
+    assert not calls
+    assert np.array_equal(built.values_mm, read.values_mm)
+    assert np.array_equal(built.origin_mm, read.origin_mm)
+    assert built.spacing_mm == read.spacing_mm
+
+
+def test_another_shape_or_spacing_is_another_field(tmp_path: Path) -> None:
+    for lengths, spacing in (((20, 30, 40), 5.0), ((20, 30, 41), 5.0), ((20, 30, 40), 6.0)):
+        cached_field(trimesh.creation.box(lengths), spacing, folder=tmp_path)
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_a_damaged_field_is_built_anew(tmp_path: Path) -> None:
+    mesh = trimesh.creation.box((20, 30, 40))
+    built = cached_field(mesh, 5.0, folder=tmp_path)
+    (file,) = tmp_path.iterdir()
+    file.write_bytes(file.read_bytes()[:100])
+    assert np.array_equal(cached_field(mesh, 5.0, folder=tmp_path).values_mm, built.values_mm)
+
+
+@pytest.mark.parametrize("spacing_mm", [0.0, -1.0, float("nan"), 0.01])
+def test_a_spacing_that_cannot_be_meant_is_refused(spacing_mm: float) -> None:
+    with pytest.raises(ValueError, match="mm"):
+        build_field(trimesh.creation.box((20, 30, 40)), spacing_mm)
