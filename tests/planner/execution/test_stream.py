@@ -16,7 +16,7 @@ from planner.table.motion import Limits, roll_out
 from planner.table.velocity_profile import advance
 from planner.table.wire import StreamError, Wire
 from tests.planner.run_examples import paused_run_input
-from tools.bench_stream import random_plan
+from tools.bench.stream import random_plan
 
 LIMITS = Limits()
 

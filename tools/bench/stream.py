@@ -16,8 +16,8 @@ from planner.planning.plan import Plan
 from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
 from planner.table.wire import Wire
-from tools.timing import print_table
-from tools.virtual_run import VirtualRun, random_run_inputs, run_in_virtual_time, shipped_run_input
+from tools.bench.timing import print_table
+from tools.bench.virtual_run import VirtualRun, random_run_inputs, run_in_virtual_time, shipped_run_input
 
 RANDOM_PLANS = 200
 LEAD_S = 0.0035
@@ -34,7 +34,7 @@ PLANT = {
 }
 
 
-def bench_stream(stream: TextIO) -> None:
+def bench(stream: TextIO) -> None:
     """Print every figure of streaming and execution."""
     _bench_rounding(stream)
     _bench_shipped(stream)

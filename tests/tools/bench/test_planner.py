@@ -5,7 +5,7 @@ from planner.planning.dijkstra import Cells, lattice_path
 from planner.planning.plan import Plan
 from planner.planning.problem import Problem
 from planner.table.motion import Limits
-from tools.bench_planner import lattice_optimum, median_seconds
+from tools.bench.planner import lattice_optimum, median_seconds
 
 
 def test_what_plans_are_measured_against_is_the_optimum_of_scipys_graph() -> None:

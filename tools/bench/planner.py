@@ -79,7 +79,7 @@ class Tally(NamedTuple):
     seconds: list[float]
 
 
-def bench_planner(stream: TextIO) -> None:
+def bench(stream: TextIO) -> None:
     """Print all measurements of the planners. Times are medians on this machine; compare those of one run."""
     _bench_graph(stream)
     _bench_steps(stream)

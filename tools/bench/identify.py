@@ -1,14 +1,12 @@
 """How well a minute over the wire tells the constants of tables that nobody has seen.
 
-python -m tools.bench identify                ten random plants over emulator://
-python -m tools.bench_identify --pty          the same over pseudo-terminals, in real time
+python -m tools.bench identify          ten random plants over emulator://
+python -m tools.bench identify --pty    the same over pseudo-terminals, in real time
 """
 
-import argparse
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from math import exp, log
@@ -19,12 +17,12 @@ from typing import NamedTuple, TextIO
 import emulator  # noqa: F401  # teaches pyserial the port emulator://
 from emulator.config import load_config
 from protocol.client import TableClient
+from tools.bench.timing import print_table
 from tools.identification.excitation import excitation
 from tools.identification.identify_table import DERIVED, identify
 from tools.identification.recorder import record
 from tools.identification.recording import WireRecording
 from tools.identification.recording_checks import check_recording
-from tools.timing import print_table
 
 SPREAD = {
     "motor.torque_constant_Nm_A": 0.3,
@@ -52,7 +50,7 @@ class Found(NamedTuple):
     told: bool
 
 
-def bench_identify(stream: TextIO, plants: int = 10, seed: int = 1, jobs: int = 2, in_real_time: bool = False) -> None:
+def bench(stream: TextIO, plants: int = 10, seed: int = 1, jobs: int = 2, in_real_time: bool = False) -> None:
     """Print the errors for random plants."""
     seeds = range(seed, seed + plants)
     with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(jobs) as workers:
@@ -129,21 +127,3 @@ def _identified(config: Path, recording: WireRecording) -> dict[str, Found]:
         estimate, true = constants[name], function(truth)
         found[name] = Found(estimate.value / true - 1.0, estimate.low <= true <= estimate.high, estimate.told)
     return found
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tools.bench_identify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--pty", action="store_true", help="in real time: takes minutes, on a quiet machine")
-    parser.add_argument("--plants", type=int, default=10)
-    parser.add_argument("--seed", type=int, default=1, help="of the first plant")
-    parser.add_argument("--jobs", type=int, default=2, help="tables at once")
-    options = parser.parse_args(arguments)
-    bench_identify(sys.stdout, options.plants, options.seed, options.jobs, options.pty)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

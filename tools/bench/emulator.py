@@ -22,12 +22,12 @@ from emulator.config import TableConfig, load_config
 from emulator.interpreter import Interpreter
 from emulator.table import Table
 from emulator.tick import TableConstants, TableState
-from tools.timing import median_s, percentile, print_table
+from tools.bench.timing import median_s, percentile, print_table
 
 EXCHANGES = 2000
 
 
-def bench_emulator(stream: TextIO) -> None:
+def bench(stream: TextIO) -> None:
     """Print every figure of the stand-in."""
     _bench_simulation(stream)
     _bench_growth(stream)
@@ -64,7 +64,7 @@ def _bench_growth(stream: TextIO) -> None:
         ("interpreted, a day with 24 motions", 90.0, 24, 86_400.0),
         ("interpreted, a week with 168 motions", 90.0, 168, 7 * 86_400.0),
     ):
-        command = [sys.executable, "-m", "tools.interpreted_run", str(angle_deg), str(motions), str(simulated_s)]
+        command = [sys.executable, "-m", "tools.bench.interpreted_run", str(angle_deg), str(motions), str(simulated_s)]
         answer = subprocess.run(command, check=True, capture_output=True, text=True)
         wall_s, peak_mb = (float(number) for number in answer.stdout.split())
         rows.append((name, f"{wall_s / simulated_s * 1e6:.2f}", f"{peak_mb:.0f} MB"))

@@ -20,14 +20,14 @@ from planner.kinematics.configuration import Configuration
 from planner.kinematics.inverse_kinematics import inverse_kinematics
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import MapProblem, map_problem
-from tools.timing import median_s, print_table
+from tools.bench.timing import median_s, print_table
 
 POSES = 20_000
 CAPSULE_PAIRS = 20_000
 ALL = tuple(Configuration)
 
 
-def bench_map(stream: TextIO) -> None:
+def bench(stream: TextIO) -> None:
     """Print all measurements of inverse kinematics, distances and maps."""
     _bench_kinematics(stream)
     _bench_distances(stream)
@@ -127,7 +127,7 @@ def _bench_growth(stream: TextIO) -> None:
     rows = []
     for locations, angles in ((100, 100), (1000, 100), (100, 1440), (1000, 1440)):
         answer = subprocess.run(
-            [sys.executable, "-m", "tools.bench_map", str(locations), str(angles)],
+            [sys.executable, "-m", "tools.bench.map", str(locations), str(angles)],
             check=True,
             capture_output=True,
             text=True,
@@ -177,4 +177,4 @@ if __name__ == "__main__":
     if len(sys.argv) > 1:
         _measure_growth(*map(int, sys.argv[1:]))
     else:
-        bench_map(sys.stdout)
+        bench(sys.stdout)

@@ -20,7 +20,7 @@ from planner.geometry.ray_casting import RayCaster
 from planner.scanning.latched_run import TriggerConditions
 from planner.scanning.probe import LaserProbe, measure
 from planner.scanning.scan_run import ScanOptions, scan_workpiece
-from tools.timing import median_s, print_table
+from tools.bench.timing import median_s, print_table
 
 _LINES = 256
 _BLOCK = 64
@@ -41,7 +41,7 @@ time_step_s = 0.5
 _RATES_HZ = (10.0, 35.0)
 
 
-def bench_scan(stream: TextIO) -> None:
+def bench(stream: TextIO) -> None:
     """Print all measurements of profiles and scans."""
     _bench_profiles(stream)
     _bench_whole_scans(stream)
@@ -89,7 +89,7 @@ def _by_trimesh(mesh: trimesh.Trimesh, caster: Any, probe: LaserProbe, T_WS: Flo
 def _bench_whole_scans(stream: TextIO) -> None:
     rows = []
     for rate_hz in _RATES_HZ:
-        program = f"from tools.bench_scan import scan_once; scan_once({rate_hz})"
+        program = f"from tools.bench.scan import scan_once; scan_once({rate_hz})"
         subprocess.run([sys.executable, "-c", program], check=True, capture_output=True)  # warms numba's cache
         told = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout
         profiles, points, seconds, before_mb, after_mb = told.split()

@@ -6,8 +6,8 @@ import pytest
 from planner.execution.execute import Settings
 from planner.execution.stream import rounded_stream, stream
 from planner.table.motion import Limits
-from tools.bench_stream import LEAD_S, errors_at_locations, random_plan
-from tools.virtual_run import random_run_inputs, run_in_virtual_time
+from tools.bench.stream import LEAD_S, errors_at_locations, random_plan
+from tools.bench.virtual_run import random_run_inputs, run_in_virtual_time
 
 
 def test_a_random_plan_keeps_the_limits() -> None:

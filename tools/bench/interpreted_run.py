@@ -1,6 +1,6 @@
-"""A run of the table alone in its process, without numpy and numba, as the stand-in runs it; for `bench_emulator`.
+"""A run of the table alone in its process, without numpy and numba, as the stand-in runs it.
 
-python -m tools.interpreted_run 90 24 86400     24 motions by 90 degrees in a day; prints wall seconds and peak MB
+python -m tools.bench.interpreted_run 90 24 86400     24 motions by 90 degrees in a day; prints wall seconds and peak MB
 """
 
 import sys

@@ -1,0 +1,1 @@
+"""Benchmarks: what a file measures beside its peers is its name."""

@@ -1,0 +1,44 @@
+"""Benchmarks: every figure beside a peer that runs in the same minute on the same machine.
+
+python -m tools.bench emulator map
+python -m tools.bench identify --pty
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+SUBJECTS = ("emulator", "identify", "map", "planner", "scan", "stream")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the named benchmarks and print their tables."""
+    options = _parser().parse_args(arguments)
+    for subject in options.subject:
+        bench = import_module(f"tools.bench.{subject}").bench  # each needs libraries that the others do not
+        if subject == "identify":
+            bench(sys.stdout, options.plants, options.seed, options.jobs, options.pty)
+        else:
+            bench(sys.stdout)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m tools.bench",
+        description="Measure this machine's figures, each beside a peer or the truth.",
+        epilog="examples:\n  python -m tools.bench emulator map\n  python -m tools.bench identify --pty",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("subject", choices=SUBJECTS, nargs="+")
+    identify = parser.add_argument_group("for identify")
+    identify.add_argument("--pty", action="store_true", help="in real time: takes minutes, on a quiet machine")
+    identify.add_argument("--plants", metavar="N", type=int, default=10, help="random tables (default 10)")
+    identify.add_argument("--seed", metavar="N", type=int, default=1, help="of the first table (default 1)")
+    identify.add_argument("--jobs", metavar="N", type=int, default=2, help="tables at once (default 2)")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())
