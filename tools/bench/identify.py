@@ -103,7 +103,7 @@ def _recorded(config: Path, seed: int, in_real_time: bool) -> WireRecording:
     if not in_real_time:
         return _record_over(f"emulator://?config={config}&seed={seed}")
     command = [sys.executable, "-m", "emulator", "--pty", "--config", str(config), "--seed", str(seed)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as table:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as table:
         assert table.stdout
         try:
             return _record_over(table.stdout.readline().strip())

@@ -1,7 +1,6 @@
 """From a recording to a table's constants with their confidence intervals."""
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache
+from collections.abc import Callable
 from math import exp, log
 from typing import NamedTuple
 
@@ -12,9 +11,10 @@ from emulator.config import TableConfig
 from tools.emulated import Array
 from tools.identification.estimation import Estimate, Posterior, Prior, estimate
 from tools.identification.likelihood import Intervals
-from tools.identification.parameters import ASSUMED, BACKLASH, PARAMETERS, with_logarithms
+from tools.identification.parameters import BACKLASH, PARAMETERS, with_logarithms
 from tools.identification.recording import DriveRecording, WireRecording
 from tools.identification.simulation import (
+    Standstill,
     commanded_motions,
     drive_positions_deg,
     from_rest,
@@ -30,15 +30,22 @@ _TOLD_SHARE = 0.5
 _TOLD_DEVIATION = 0.25
 """A constant is told by a recording that at least halves what was uncertain of it, and to a quarter of its value."""
 
-_WIRE_DELAY_S = 1e-4
-"""How well the times of commands and readings agree: the line delays both alike."""
+_WIRE_DELAY_S = (0.0, 5e-6)
+"""Mean and deviation: commands and readings are both carried out at the end of a tick, so that nothing is between them.
+A delay that is free to fit what the model does not foretell takes some of the gain with it."""
 
-_START_DEG = 0.02
-"""How far from the reference the encoder may stand, without a duty that tells it."""
+_OFFSET_DEG = (0.0, 0.02)
+"""Mean and deviation: how far from the reference the encoder may stand, without a duty that tells it."""
+
+_ENCODER_PHASE, _GAP_SHARE = (0.5, 0.3), (0.0, 0.6)
+"""How the table stands at first: mean and deviation, as wide as can be. Within a wide gap much depends on it."""
 
 _DRIFT_KNOT_S = 6.0
 """The encoder's place behind the reference drifts: at each change of the gain set the regulator keeps its output, and
 so forgets a little of how far it is behind. This long, straight pieces of the drift are told from the readings."""
+
+_DRIVE_DELAY_TICKS = (1.0, 1.0)
+"""Mean and deviation: a new duty waits for a tick in the PWM's buffer."""
 
 _DRIVE_WINDOW_S = 0.008
 
@@ -125,11 +132,10 @@ def identify(
     )
 
 
-def _prior(config: TableConfig, mean: Sequence[float], deviation: Sequence[float]) -> Prior:
-    return Prior(
-        np.array([*(parameter.log_of(config) for parameter in PARAMETERS), *mean]),
-        np.array([*(parameter.spread for parameter in PARAMETERS), *deviation]),
-    )
+def _prior(config: TableConfig, *others: tuple[float, float]) -> Prior:
+    """Return means and deviations of the configured constants, and of what comes after them."""
+    constants = [(parameter.log_of(config), parameter.spread) for parameter in PARAMETERS]
+    return Prior(*np.array([*constants, *others]).T)
 
 
 def _wire_problem(config: TableConfig, recording: WireRecording) -> tuple[Array, Array, Posterior]:
@@ -139,20 +145,15 @@ def _wire_problem(config: TableConfig, recording: WireRecording) -> tuple[Array,
     time_s, ticks = recording.time_s[kept], at.readings[kept]
     seen_deg = (recording.position_deg - recording.position_deg[0])[kept]
     drift = _drift(time_s)
-    size = len(PARAMETERS)
 
-    @lru_cache(maxsize=4)
-    def turned_deg(constants: tuple[float, ...]) -> Array:
-        *logarithms, delay_s = constants
-        return wire_positions_deg(with_logarithms(config, logarithms), motions, ticks - delay_s * tick_hz)
+    def foretell(constants: Array) -> Array:
+        *logarithms, delay_s, encoder_phase, gap_share = constants
+        start = Standstill(encoder_phase, gap_share)
+        return wire_positions_deg(with_logarithms(config, logarithms), motions, ticks - delay_s * tick_hz, start)
 
-    def foretell(vector: Array) -> Array:
-        return turned_deg(tuple(vector[: size + 1])) + drift @ vector[size + 1 :]
-
-    knots = drift.shape[1]
-    prior = _prior(config, [0.0] * (1 + knots), [_WIRE_DELAY_S, *[_START_DEG] * knots])
-    steps = np.array([*(parameter.step for parameter in PARAMETERS), 2e-4, *[1e-3] * knots])
-    return time_s, seen_deg, Posterior(_intervals(config, recording, seen_deg), foretell, prior, steps, ASSUMED)
+    prior = _prior(config, _WIRE_DELAY_S, _ENCODER_PHASE, _GAP_SHARE, *[_OFFSET_DEG] * drift.shape[1])
+    steps = np.array([*(parameter.step for parameter in PARAMETERS), 2e-4, 0.0, 0.0])
+    return time_s, seen_deg, Posterior(_intervals(config, recording, seen_deg), foretell, drift, prior, steps)
 
 
 def _intervals(config: TableConfig, recording: WireRecording, seen_deg: Array) -> Intervals:
@@ -194,14 +195,11 @@ def _drive_problem(config: TableConfig, recording: DriveRecording) -> tuple[Arra
         made: Array = np.diff(positions[::window])
         return made
 
-    prior = _prior(config, [1.0], [1.0])
+    prior = _prior(config, _DRIVE_DELAY_TICKS)
     steps = np.array([*(parameter.step for parameter in PARAMETERS), 0.1])
     time_s = np.arange(1, len(seen_deg) + 1) * window / tick_hz
-    return (
-        time_s,
-        seen_deg,
-        Posterior(Intervals(seen_deg - count_deg, seen_deg + count_deg), foretell, prior, steps, ASSUMED),
-    )
+    readings, no_drift = Intervals(seen_deg - count_deg, seen_deg + count_deg), np.empty((len(seen_deg), 0))
+    return time_s, seen_deg, Posterior(readings, foretell, no_drift, prior, steps)
 
 
 def _constants(config: TableConfig, posterior: Posterior, found: Estimate, from_drive: bool) -> tuple[Constant, ...]:

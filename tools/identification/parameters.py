@@ -50,9 +50,6 @@ PARAMETERS = (
     Parameter("friction", "viscous_Nm_s", 0.7, least=1e-9, step=0.1),
 )
 
-ASSUMED = (4, 5, 6, 7, 8, 9)
-"""The places of those that are mostly taken for granted."""
-
 BACKLASH = 3
 """The backlash's place: the one constant from several values of which the search begins."""
 

@@ -5,7 +5,7 @@ drive's duty is known, so there the plant runs alone.
 """
 
 from math import ceil
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -14,14 +14,25 @@ from numpy.typing import NDArray
 from emulator import drive_train
 from emulator.batch import COLUMNS, run
 from emulator.config import TableConfig
-from emulator.drive_train import DriveState, DriveTrain
-from tools.emulated import Array, Motion, motion_rows, switched_on
+from emulator.drive_train import DriveState, DriveTrain, at_standstill
+from emulator.profiler import Profile
+from emulator.tick import table_constants, woken
+from tools.emulated import Array, Motion, motion_rows
 from tools.identification.recording import DriveRecording, WireRecording
 from tools.patient_interrupts import interrupts_wait
 
 _ANGLE = COLUMNS.index("motor_angle_rad")
 _REFERENCE_SPEED = COLUMNS.index("reference_speed")
-_SEED = 0
+
+
+class Standstill(NamedTuple):
+    """How a table stands at first. A number beyond its range is folded back into it: a search needs no bounds."""
+
+    encoder_phase: float = 0.5  # how far the shaft is between two counts, 0..1
+    gap_share: float = 0.0  # how far the teeth are from mid-gap towards a flank, -1..1
+
+
+MIDDLE = Standstill()
 
 
 def commanded_motions(config: TableConfig, recording: WireRecording, ticks: Array) -> NDArray[np.int64]:
@@ -46,9 +57,11 @@ def commanded_motions(config: TableConfig, recording: WireRecording, ticks: Arra
     return motion_rows(config, motions)
 
 
-def wire_positions_deg(config: TableConfig, motions: NDArray[np.int64], ticks: Array) -> Array:
+def wire_positions_deg(
+    config: TableConfig, motions: NDArray[np.int64], ticks: Array, start: Standstill = MIDDLE
+) -> Array:
     """Return where the encoder would be at given ticks, which may have fractions, from where it was at the start."""
-    angle = _samples(config, motions, ceil(ticks.max()) + 2)[:, _ANGLE]
+    angle = _samples(config, motions, ceil(ticks.max()) + 2, start)[:, _ANGLE]
     angle = np.concatenate([[0.0], angle])
     tick = np.clip(np.floor(ticks).astype(np.int64), 0, len(angle) - 2)
     share = ticks - tick
@@ -58,15 +71,16 @@ def wire_positions_deg(config: TableConfig, motions: NDArray[np.int64], ticks: A
 
 def from_rest(config: TableConfig, motions: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Tell which motions begin when the profile stands."""
-    speed = _samples(config, motions, int(motions[-1, 0]) + 1)[:, _REFERENCE_SPEED]
+    speed = _samples(config, motions, int(motions[-1, 0]) + 1, MIDDLE)[:, _REFERENCE_SPEED]
     before: NDArray[np.bool_] = np.concatenate([[0.0], speed])[motions[:, 0]] == 0.0
     return before
 
 
-def _samples(config: TableConfig, motions: NDArray[np.int64], ticks: int) -> Array:
-    constants, state = switched_on(config, _SEED)
+def _samples(config: TableConfig, motions: NDArray[np.int64], ticks: int, start: Standstill) -> Array:
+    constants = table_constants(config, encoder_phase=start.encoder_phase % 1.0)
+    drive = at_standstill(constants.drive, gap_share=abs((start.gap_share - 1.0) % 4.0 - 2.0) - 1.0)
     with interrupts_wait():
-        return run(constants, state, ticks, motions)[1]
+        return run(constants, woken(constants, drive, Profile.of(1, 1)), ticks, motions)[1]
 
 
 def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) -> Array:
@@ -81,10 +95,10 @@ def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) ->
     padded = np.concatenate([np.zeros(whole + 2), duty])[: len(duty) + 1]
     share = delay_ticks - whole
     applied = (padded[1:] * (1.0 - share) + padded[:-1] * share) * config.driver.supply_V
-    constants, state = switched_on(config, _SEED)
+    train = drive_train.drive_train(config)
     angle = np.empty(len(duty))
     with interrupts_wait():
-        _run_open(constants.drive, state.drive, applied, angle)
+        _run_open(train, at_standstill(train, MIDDLE.gap_share), applied, angle)
     return np.degrees(angle) / config.gears.ratio
 
 

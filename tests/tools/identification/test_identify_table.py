@@ -2,9 +2,14 @@ from pathlib import Path
 
 import pytest
 
+import emulator  # noqa: F401  # teaches pyserial the port emulator://
 from emulator.config import TableConfig, load_config
+from protocol.client import TableClient
+from tools.bench.identify import write_plant
 from tools.emulated import Motion, emulate
+from tools.identification.excitation import excitation
 from tools.identification.identify_table import Constant, Identified, coulomb_Nm, identify
+from tools.identification.recorder import record
 from tools.identification.recording import DriveRecording, WireRecording
 from tools.identification.recording_checks import check_recording
 from tools.tuning.linear_model import Teeth, speed_gain_deg_s, time_constant_s
@@ -28,6 +33,14 @@ def test_a_minute_over_the_wire_tells_the_constants_of_a_table_that_it_has_not_s
     told = {constant.name for constant in found.constants if constant.told}
     assert {"gain", "time constant", "Coulomb friction", "backlash"} <= told
     assert "delay" not in told  # the line delays commands and readings alike
+
+
+def test_a_long_ridge_is_followed_to_its_top(assumed: TableConfig, tmp_path: Path) -> None:
+    plant = write_plant(tmp_path, seed=23)  # climbing by slopes alone stops there with a third of the friction missing
+    with TableClient.open(f"emulator://?config={plant}&seed=23") as client:
+        recorded = record(client, excitation(60.0, 40.0, 100.0, seed=0), speed_deg_s=40.0, baud=9600)
+
+    assert_within_bounds(identify(assumed, recorded), load_config(plant))
 
 
 def test_so_does_a_minute_that_a_busy_computer_recorded(
