@@ -4,6 +4,7 @@ import ast
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -85,6 +86,10 @@ def imported_modules(source: Path) -> Iterator[str]:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
+def module_name(source: Path) -> str:
+    return ".".join(source.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
 def imported_packages(source: Path) -> Iterator[str]:
     return (name.partition(".")[0] for name in imported_modules(source))
 
@@ -105,6 +110,15 @@ def test_imports_run_one_way(package: str) -> None:
     sources = sorted((ROOT / package).rglob("*.py"))
     assert sources
     assert imports_from(MAY_IMPORT.keys() - MAY_IMPORT[package], sources) == []
+
+
+def test_no_imports_run_in_a_circle() -> None:
+    sources = {module_name(source): source for package in MAY_IMPORT for source in (ROOT / package).rglob("*.py")}
+    needs = {
+        name: {used if used in sources else used.rpartition(".")[0] for used in imported_modules(source)}
+        for name, source in sources.items()
+    }
+    TopologicalSorter(needs).prepare()  # raises a CycleError that names the circle
 
 
 def test_each_folder_of_the_planner_is_a_layer() -> None:

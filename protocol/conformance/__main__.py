@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from protocol.conformance.case import Case, chosen_cases
+from protocol.conformance.case import Case
+from protocol.conformance.catalogue import chosen_cases
 from protocol.conformance.command_line import UsageError, ended_by_signals, say, status_after, tell
 from protocol.conformance.ports import SessionError, open_port
 from protocol.conformance.profile import ProfileError, load_profile

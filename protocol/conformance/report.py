@@ -8,7 +8,8 @@ from itertools import groupby
 from pathlib import Path
 from string import Template
 
-from protocol.conformance.case import Case, all_cases
+from protocol.conformance.case import Case
+from protocol.conformance.catalogue import all_cases
 from protocol.conformance.record import Header, count_verdicts, versions, write_whole
 from protocol.conformance.reference import MotionRecord
 from protocol.conformance.suite import Outcome

@@ -8,7 +8,8 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 
-from protocol.conformance.case import Case, only
+from protocol.conformance.case import Case
+from protocol.conformance.catalogue import only
 from protocol.conformance.command_line import UsageError, confirm, say, show_progress, status_after, tell
 from protocol.conformance.host_watch import watch_in
 from protocol.conformance.ports import described, is_simulated

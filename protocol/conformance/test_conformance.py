@@ -6,7 +6,8 @@ from contextlib import ExitStack
 
 import pytest
 
-from protocol.conformance.case import Case, all_cases
+from protocol.conformance.case import Case
+from protocol.conformance.catalogue import all_cases
 from protocol.conformance.command_line import ended_by_signals
 from protocol.conformance.fixture import pty_stand_in
 from protocol.conformance.host_watch import watch_in

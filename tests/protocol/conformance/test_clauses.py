@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from protocol.conformance.case import all_cases, chosen_cases, only
+from protocol.conformance.catalogue import all_cases, chosen_cases, only
 from protocol.conformance.clauses import specification
 
 PAGE = Path(__file__).parents[3] / "docs" / "protocol.md"

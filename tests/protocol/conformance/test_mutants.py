@@ -8,7 +8,7 @@ import dataclasses
 import pytest
 
 from emulator.config import load_config
-from protocol.conformance.case import all_cases, chosen_cases
+from protocol.conformance.catalogue import all_cases, chosen_cases
 from protocol.conformance.profile import load_profile
 from protocol.conformance.stand import STRICT, InProcess
 from protocol.conformance.suite import Outcome, Session, SessionError

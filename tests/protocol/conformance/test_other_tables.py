@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from protocol.conformance.case import all_cases, chosen_cases
+from protocol.conformance.catalogue import all_cases, chosen_cases
 from protocol.conformance.profile import load_profile
 from protocol.conformance.stand import Stand, WireOnly
 from protocol.conformance.suite import Outcome, Session

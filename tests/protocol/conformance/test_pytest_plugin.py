@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from protocol.conformance.case import all_cases
+from protocol.conformance.catalogue import all_cases
 
 ROOT = Path(__file__).parents[3]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from protocol.conformance.case import chosen_cases
+from protocol.conformance.catalogue import chosen_cases
 from protocol.conformance.profile import load_profile
 from protocol.conformance.record import Header
 from protocol.conformance.report import write_report

@@ -3,7 +3,8 @@
 import dataclasses
 
 from emulator.protocol_emulator import Serial
-from protocol.conformance.case import Case, chosen_cases
+from protocol.conformance.case import Case
+from protocol.conformance.catalogue import chosen_cases
 from protocol.conformance.profile import load_profile
 from protocol.conformance.rig import Rig
 from protocol.conformance.stand import InProcess

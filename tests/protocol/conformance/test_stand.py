@@ -11,7 +11,7 @@ import pytest
 
 from emulator.table import Table
 from protocol.conformance.__main__ import main
-from protocol.conformance.case import chosen_cases
+from protocol.conformance.catalogue import chosen_cases
 from protocol.conformance.fixture import RotaryTable
 from protocol.conformance.profile import load_profile
 from protocol.conformance.stand import POWER_CYCLE, TRIGGER, Programs, StandError, WireOnly

@@ -11,7 +11,7 @@ import serial
 from emulator.config import load_config
 from emulator.faults import fault_from
 from emulator.protocol_emulator import Serial
-from protocol.conformance.case import all_cases, chosen_cases
+from protocol.conformance.catalogue import all_cases, chosen_cases
 from protocol.conformance.ports import SessionError
 from protocol.conformance.profile import Profile, load_profile
 from protocol.conformance.random_walk import walk
