@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from emulator import drive_train, encoder, firmware, fixed_point, friction, pid, profiler, tick
 from emulator.drive_train import DriveState
 from emulator.firmware import begin_motion, distance_to
+from emulator.patient_interrupts import interrupts_wait
 from emulator.profiler import Profile
 from emulator.tick import TableConstants, TableState, step
 
@@ -51,10 +52,11 @@ def run(
 ) -> tuple[TableState, NDArray[np.float64]]:
     """Return the state after `ticks`, and a row of `COLUMNS` after each `every` of them.
 
-    A motion or load that is due at tick k acts before the step from k to k + 1.
+    A motion or load that is due at tick k acts before the step from k to k + 1. Ctrl-C waits for the end of the run.
     """
     samples = np.empty((ticks // every, len(COLUMNS)))
-    return _compiled(constants, state, ticks, motions, loads, every, samples), samples
+    with interrupts_wait():
+        return _compiled(constants, state, ticks, motions, loads, every, samples), samples
 
 
 def advance(

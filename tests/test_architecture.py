@@ -67,6 +67,7 @@ EMULATOR_EDGE = {
     "control_client",
     "device_link",
     "inotify",
+    "patient_interrupts",
     "pty_port",
     "server",
     "signals",

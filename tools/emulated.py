@@ -13,7 +13,6 @@ from emulator.drive_train import at_standstill
 from emulator.fixed_point import POSITION_BITS, SPEED_BITS, to_fixed
 from emulator.profiler import Profile
 from emulator.tick import TableConstants, TableState, table_constants, woken
-from tools.patient_interrupts import interrupts_wait
 
 Array = NDArray[np.float64]
 
@@ -87,8 +86,7 @@ def emulate(
     tick_hz = config.control.tick_hz
     load_rows = np.array([(load.time_s * tick_hz, load.torque_Nm) for load in loads or []]).reshape(-1, 2)
     ticks = round(duration_s * tick_hz)
-    with interrupts_wait():
-        _, samples = run(constants, state, ticks, motion_rows(config, motions), load_rows)
+    _, samples = run(constants, state, ticks, motion_rows(config, motions), load_rows)
     column = {name: samples[:, index] for index, name in enumerate(COLUMNS)}
     count_deg = config.counts_per_turn / 360.0
     window = config.control.speed_window_ticks

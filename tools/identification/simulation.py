@@ -15,11 +15,11 @@ from emulator import drive_train
 from emulator.batch import COLUMNS, run
 from emulator.config import TableConfig
 from emulator.drive_train import DriveState, DriveTrain, at_standstill
+from emulator.patient_interrupts import interrupts_wait
 from emulator.profiler import Profile
 from emulator.tick import table_constants, woken
 from tools.emulated import Array, Motion, motion_rows
 from tools.identification.recording import DriveRecording, WireRecording
-from tools.patient_interrupts import interrupts_wait
 
 _ANGLE = COLUMNS.index("motor_angle_rad")
 _REFERENCE_SPEED = COLUMNS.index("reference_speed")
@@ -79,8 +79,7 @@ def from_rest(config: TableConfig, motions: NDArray[np.int64]) -> NDArray[np.boo
 def _samples(config: TableConfig, motions: NDArray[np.int64], ticks: int, start: Standstill) -> Array:
     constants = table_constants(config, encoder_phase=start.encoder_phase % 1.0)
     drive = at_standstill(constants.drive, gap_share=abs((start.gap_share - 1.0) % 4.0 - 2.0) - 1.0)
-    with interrupts_wait():
-        return run(constants, woken(constants, drive, Profile.of(1, 1)), ticks, motions)[1]
+    return run(constants, woken(constants, drive, Profile.of(1, 1)), ticks, motions)[1]
 
 
 def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) -> Array:

@@ -1,11 +1,9 @@
 import signal
-import subprocess
-import sys
 import threading
 
 import pytest
 
-from tools.patient_interrupts import interrupts_wait
+from emulator.patient_interrupts import interrupts_wait
 
 
 def test_an_interrupt_waits_until_the_block_is_done() -> None:
@@ -41,32 +39,3 @@ def test_another_thread_keeps_its_hands_off_signals() -> None:
     thread.start()
     thread.join()
     assert seen == [former]
-
-
-INTERRUPTED_RUN = """
-import os, signal, sys, threading
-from emulator.config import load_config
-from tools.command_line import ended
-from tools.emulated import Motion, emulate
-
-config = load_config()
-motions = [Motion(0.1, 1000.0, 10.0, 100.0)]
-emulate(config, motions, 0.2)  # compiled now
-
-def work():
-    threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
-    for _ in range(600):
-        emulate(config, motions, 200.0)
-    return 0
-
-sys.exit(ended("tool", work))
-"""
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="there a process cannot interrupt itself so")
-def test_an_interrupt_in_a_compiled_run_ends_the_command_and_does_not_crash_it() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", INTERRUPTED_RUN], check=False, capture_output=True, text=True, timeout=120.0
-    )
-
-    assert (done.returncode, done.stderr) == (130, "tool: interrupted\n")
