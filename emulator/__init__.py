@@ -3,6 +3,9 @@
 Importing it teaches pyserial the port `emulator://`, a private table in virtual time.
 """
 
+import protocol.quiet_start  # noqa: F401 - before the imports that take long
+
+# isort: split
 import serial
 
 from emulator.config import TableConfig, load_config

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from emulator import drive_train, encoder, firmware, fixed_point, friction, pid, profiler, tick
 from emulator.drive_train import DriveState
 from emulator.firmware import begin_motion, distance_to
-from emulator.patient_interrupts import interrupts_wait
 from emulator.profiler import Profile
 from emulator.tick import TableConstants, TableState, step
+from protocol.interrupts import signals_wait
 
 MOVE_TO: Final = 0
 MOVE_BY: Final = 1
@@ -52,10 +52,11 @@ def run(
 ) -> tuple[TableState, NDArray[np.float64]]:
     """Return the state after `ticks`, and a row of `COLUMNS` after each `every` of them.
 
-    A motion or load that is due at tick k acts before the step from k to k + 1. Ctrl-C waits for the end of the run.
+    A motion or load that is due at tick k acts before the step from k to k + 1. Signals wait for the end of the run:
+    an interrupt that is raised in one of numba's callbacks is lost, or crashes the process.
     """
     samples = np.empty((ticks // every, len(COLUMNS)))
-    with interrupts_wait():
+    with signals_wait():
         return _compiled(constants, state, ticks, motions, loads, every, samples), samples
 
 

@@ -10,13 +10,16 @@ from planner.commands import run as run_command
 from planner.commands import scan as scan_command
 from planner.commands import show as show_command
 from planner.errors import PlannerError
+from protocol.interrupts import ended_by_signals, said, status_after
 
 _BAD_INPUT = 2
-_INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and return its exit status: 0, 1 for a negative verdict, 2 for input that cannot be used."""
+    """Run a command and return its exit status.
+
+    0; 1 for a negative verdict; 2 for input that cannot be used; 128 and the number of the signal that ended it.
+    """
     parser = argparse.ArgumentParser(
         prog="python -m planner",
         description="Plan the motion of a rotary table under a scanning robot arm.",
@@ -29,14 +32,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     scan_command.add_parser(commands)
     show_command.add_parser(commands)
     chosen = parser.parse_args(arguments)
+    with ended_by_signals() as ending:
+        return ending.status(_status_of(chosen))
+
+
+def _status_of(chosen: argparse.Namespace) -> int:
     try:
         return int(chosen.run(chosen))
     except PlannerError as error:
         print(error, file=sys.stderr)
         return _BAD_INPUT
-    except KeyboardInterrupt:
-        print("\ninterrupted, nothing more was written", file=sys.stderr)
-        return _INTERRUPTED
+    except KeyboardInterrupt as interrupt:
+        print(f"\n{said(interrupt, 'interrupted')}; nothing more was written", file=sys.stderr)
+        return status_after(interrupt)
 
 
 if __name__ == "__main__":

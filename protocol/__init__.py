@@ -1,11 +1,16 @@
 """The wire between a client and the rotary table."""
 
+import protocol.quiet_start  # noqa: F401 - first, see there
+
+# isort: split
+
 from protocol.client import TableClient
 from protocol.clock import Clock, WallClock
 from protocol.codec import decode_command, decode_reply, encode_command, encode_reply
 from protocol.errors import (
     ArrivalTimeout,
     CommandRefused,
+    NotStopped,
     PortError,
     ProtocolMisuse,
     ReplyTimeout,
@@ -25,6 +30,7 @@ __all__ = [
     "CommandRefused",
     "ErrorCode",
     "LineBuffer",
+    "NotStopped",
     "Ok",
     "Port",
     "PortError",

@@ -6,9 +6,10 @@ from types import TracebackType
 from typing import Self
 
 from protocol.dialogue import Dialogue
-from protocol.errors import ArrivalTimeout, PortError, ProtocolMisuse
+from protocol.errors import ArrivalTimeout, PortError, ProtocolMisuse, TableError
 from protocol.messages import Angle, Command, Verb
 from protocol.port import Port
+from protocol.stopping import BRAKING_DEG_S2, stop
 
 POLL_INTERVAL_S = 0.05
 
@@ -24,15 +25,19 @@ class TableClient:
         clock: the clock that the port carries, else the wall clock.
     """
 
-    def __init__(self, port: Port, timeout_s: float = 1.0, decimals: int = 1) -> None:
+    def __init__(
+        self, port: Port, timeout_s: float = 1.0, decimals: int = 1, braking_deg_s2: float = BRAKING_DEG_S2
+    ) -> None:
         """Take over an open port; nothing is sent before the first command.
 
         Args:
             port: an open pyserial port or its like; its read time-out is set here, its `clock` is used if it has one.
             timeout_s: how long to wait for a reply.
             decimals: places after the point of the numbers sent.
+            braking_deg_s2: the greatest A to stop a table with that has not accepted one from this client.
         """
         self._port = port
+        self._braking_deg_s2 = braking_deg_s2
         self._dialogue = Dialogue(port, timeout_s, decimals)
         self.clock = self._dialogue.clock
 
@@ -91,16 +96,22 @@ class TableClient:
         """Set the acceleration from the next motion on (A)."""
         self._dialogue.exchange(Command(Verb.SET_ACCELERATION, _decimal(acceleration_deg_s2)))
 
-    def stop(self) -> None:
-        """Brake, and come back to where the table is now (R 0); sent at once even when replies are missing.
+    def stop(self) -> float:
+        """Brake with the greatest A that the table has accepted, wait until it stands, and return where (H).
+
+        See `protocol.stopping`. S and A are those of before afterwards, where they are known.
 
         Raises:
-            TableError: as every command; the table may have heard the command all the same.
+            NotStopped: it was not seen to stand; the message says why, and what it will do.
         """
-        stop = Command(Verb.MOVE_BY, Decimal(0))
-        if self._dialogue.has_lost_its_place:
-            self._dialogue.send_at_once(stop)
-        self._dialogue.exchange(stop)
+        return stop(self._dialogue, self._braking_deg_s2)
+
+    def stop_and_report(self) -> str:
+        """Stop the table, and return in words where it stands, or why it may not stand and what it will do."""
+        try:
+            return f"the table was stopped, and stands at {self.stop():.6g} deg"
+        except TableError as error:
+            return str(error)
 
     def wait_until_at(
         self,
@@ -131,6 +142,7 @@ class TableClient:
                 progress(float(position))
             readings_there = readings_there + 1 if abs(position - target) <= tolerance else 0
             if readings_there == 2:
+                self._dialogue.rests_at(float(position))
                 return float(position)
             if self.clock.now_s() >= deadline_s:
                 raise ArrivalTimeout(

@@ -5,7 +5,8 @@
     ├── ReplyTimeout         a reply did not come in time
     ├── UnexpectedReply      what came is no answer to what was sent
     ├── CommandRefused       the table answered `ERR n text`
-    └── ArrivalTimeout       the table did not reach its target in time
+    ├── ArrivalTimeout       the table did not reach its target in time
+    └── NotStopped           the table was told to stop, and was not seen to stand
 
     ProtocolMisuse           this program asked for what the protocol cannot say (a `ValueError`)
 
@@ -55,6 +56,10 @@ class ArrivalTimeout(TableError):
     def __init__(self, message: str, position_deg: float) -> None:
         super().__init__(message)
         self.position_deg = position_deg
+
+
+class NotStopped(TableError):
+    """The table was told to stop, and was not seen to stand; the message says what it will do."""
 
 
 class ProtocolMisuse(ValueError):

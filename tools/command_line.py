@@ -6,8 +6,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+from protocol.interrupts import ended_by_signals, said, status_after
+
 _BAD_INPUT = 2
-_INTERRUPTED = 130
 
 
 def ended(name: str, work: Callable[[], int], *expected: type[Exception]) -> int:
@@ -19,12 +20,13 @@ def ended(name: str, work: Callable[[], int], *expected: type[Exception]) -> int
         expected: The errors that say what the user can do about them.
     """
     try:
-        status = work()
+        with ended_by_signals() as ending:
+            status = work()
         if sys.stdout is not None:
             sys.stdout.flush()
-    except KeyboardInterrupt:
-        print(f"{name}: interrupted", file=sys.stderr)
-        return _INTERRUPTED
+    except KeyboardInterrupt as interrupt:
+        print(f"{name}: {said(interrupt, 'interrupted')}", file=sys.stderr)
+        return status_after(interrupt)
     except BrokenPipeError:
         _give_up_stdout()
         print(f"{name}: nobody reads what it prints any more", file=sys.stderr)
@@ -33,9 +35,9 @@ def ended(name: str, work: Callable[[], int], *expected: type[Exception]) -> int
         if not isinstance(error, (*expected, OSError)):
             raise
         _give_up_stdout()
-        print(f"{name}: {error}", file=sys.stderr)
-        return _BAD_INPUT
-    return status
+        print(f"{name}: {said(error)}", file=sys.stderr)
+        return ending.status(_BAD_INPUT)
+    return ending.status(status)
 
 
 def check_writable(path: Path) -> None:

@@ -20,6 +20,7 @@ from planner.table.motion import Limits
 from planner.table.velocity_profile import MotionCommand, ReferenceState, time_to_rest_s
 from planner.table.wire import Grid, Wire, command_line, exchanges_s
 from protocol import ArrivalTimeout, CommandRefused, TableClient, TableError, Verb
+from protocol.interrupts import signals_wait
 
 # Between the last reading and the next command: what the operating system may take.
 _SLACK_S = 0.005
@@ -98,29 +99,34 @@ def execute(
     watch = TableWatch(
         table, motion, wire, record, settings.tolerance_deg, settings.poll_s, settings.look_s, view, progress
     )
-    is_done = False
     try:
         _Run(table, wire, commands, watch, record, settings.lead_s).go(motion)
-        is_done = True
-    except (TableError, PlannerError) as error:
-        record.failure = str(error)
+    except BaseException as error:
+        report = _stopped(table)
+        reason = "interrupted" if isinstance(error, KeyboardInterrupt) else error
+        record.failure = f"{reason}; {report}"
         record.has_strayed = isinstance(error, StrayedError | ArrivalTimeout)
-    except KeyboardInterrupt:
-        record.failure = "interrupted"
+        if not isinstance(error, TableError | PlannerError | KeyboardInterrupt):
+            raise
     finally:
-        if not is_done:
-            with suppress(TableError):
-                table.stop()
         if progress is not None:
             progress(1, 1)
     return record
+
+
+def _stopped(table: TableClient) -> str:
+    """Stop the table, and return in words how that went; a signal that comes meanwhile shows in the exit status."""
+    report = ""
+    with suppress(KeyboardInterrupt), signals_wait():
+        report = table.stop_and_report()
+    return report
 
 
 def bring_to(table: TableClient, angle_deg: float, limits: Limits, wire: Wire, tolerance_deg: float = 0.1) -> None:
     """Move the table to an angle at the limits, and wait until it stands there.
 
     Raises:
-        TableError: the table did not get there; it was stopped.
+        TableError: the table did not get there; it was stopped, as after Ctrl-C.
     """
     way = Grid(limits, wire).command(MotionCommand(angle_deg, *limits))
     needed_s = time_to_rest_s(ReferenceState(table.position_deg(), 0.0), way)
@@ -135,9 +141,10 @@ def bring_to(table: TableClient, angle_deg: float, limits: Limits, wire: Wire, t
     try:
         table.move_to(way.target_deg)
         table.wait_until_at(way.target_deg, tolerance_deg, 2.0 * needed_s + 3.0)
-    except (TableError, KeyboardInterrupt):
-        with suppress(TableError):
-            table.stop()
+    except TableError as error:
+        raise ExecutionError(f"{error}; {_stopped(table)}") from error
+    except KeyboardInterrupt as interrupt:
+        interrupt.add_note(_stopped(table))
         raise
 
 

@@ -8,13 +8,14 @@ from typing import NoReturn
 
 from protocol.conformance.case import Case
 from protocol.conformance.catalogue import chosen_cases
-from protocol.conformance.command_line import UsageError, ended_by_signals, say, status_after, tell
+from protocol.conformance.command_line import UsageError, say, tell
 from protocol.conformance.ports import SessionError, open_port
 from protocol.conformance.profile import ProfileError, load_profile
 from protocol.conformance.record import RecordError
 from protocol.conformance.replay_run import run_replay
 from protocol.conformance.stand import StandError
 from protocol.conformance.suite_run import run_suite
+from protocol.interrupts import ended_by_signals, status_after
 
 _EXAMPLE = """examples:
   python -m protocol.conformance --port emulator:// --out build/conformance

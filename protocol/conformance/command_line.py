@@ -1,47 +1,17 @@
-"""What the kit's command line says and asks, and how it is told to end."""
+"""What the kit's command line says and asks."""
 
 import os
-import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from types import FrameType
+from contextlib import suppress
 from typing import TextIO
 
 from protocol.conformance.ports import is_simulated
 from protocol.conformance.profile import Profile
 from protocol.conformance.wire import ReopenablePort
 
-_ENDING = ("SIGTERM", "SIGHUP")
-
 
 class UsageError(Exception):
     """The command line cannot be carried out; the message says why."""
-
-
-class Told(KeyboardInterrupt):
-    """A signal told the program to end, which it does as after Ctrl-C."""
-
-
-@contextmanager
-def ended_by_signals() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP break into a `with` block as Ctrl-C does: a table in motion must be stopped."""
-    before = {}
-    for name in _ENDING:
-        number = getattr(signal, name, None)  # not every system has them
-        if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # nohup has SIGHUP ignored
-            with suppress(ValueError):  # only a program's main thread may say so
-                before[number] = signal.signal(number, _end)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def status_after(interrupt: KeyboardInterrupt) -> int:
-    """Return the exit status of a program that a signal has ended."""
-    return 128 + int(interrupt.args[0] if isinstance(interrupt, Told) else signal.SIGINT)
 
 
 def say(sentence: str) -> None:
@@ -96,7 +66,3 @@ def confirm(url: str, may_move: bool, profile: Profile, port: ReopenablePort) ->
     sys.stderr.flush()
     if sys.stdin.readline().strip().lower() != "yes":
         raise UsageError("nothing was moved")
-
-
-def _end(number: int, _: FrameType | None) -> None:
-    raise Told(number)

@@ -53,7 +53,8 @@ class RotaryTable:
     @cached_property
     def client(self) -> TableClient:
         """A client on the port."""
-        return TableClient(self.port, self.profile.serial.timeout_s, self.profile.serial.decimals)
+        serial, motion = self.profile.serial, self.profile.motion
+        return TableClient(self.port, serial.timeout_s, serial.decimals, motion.acceleration_deg_s2)
 
     def trigger(self) -> None:
         """Put one edge on the trigger input; a test is skipped where the rig cannot."""

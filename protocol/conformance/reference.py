@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from protocol.conformance.trapezoid import Motion, plan
+from protocol.trapezoid import Motion, plan
 
 _DELAYS = ((0.0,), (-1.0,), (1.0,), (-1.0, 1.0), (1.0, -1.0))
 """When commands were carried out, within the times that they leave open: the courses that a motion may have taken."""

@@ -13,7 +13,6 @@ from protocol.conformance.record import Record, read_record
 from protocol.conformance.replay import replay
 from protocol.conformance.stand import Stand, stand_beside
 from protocol.conformance.suite import session_at
-from protocol.conformance.suite_run import how_it_was_left
 from protocol.conformance.wire import RecordedPort, ReopenablePort, Wire
 
 
@@ -41,7 +40,7 @@ def run_replay(options: argparse.Namespace, profile: Profile, port: ReopenablePo
         session.end()
     except BaseException:
         session.stop()
-        say(how_it_was_left(session))
+        say(session.how_it_was_left)
         raise
     tell(f"{parted} of {len(record.cases)} cases part")
     return int(parted > 0)

@@ -6,8 +6,9 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from random import Random
 
+from protocol.client import TableClient
 from protocol.conformance.case import Case
-from protocol.conformance.first_contact import CANCEL, PATIENCE_S, SETTLE_S, resting_position
+from protocol.conformance.first_contact import PATIENCE_S, SETTLE_S, resting_position
 from protocol.conformance.host_watch import Punctual, Watch
 from protocol.conformance.ports import SessionError
 from protocol.conformance.profile import Profile
@@ -16,6 +17,7 @@ from protocol.conformance.rig import Rig
 from protocol.conformance.stand import PRESET, RecordedStand, Stand, StandError, capabilities
 from protocol.conformance.verdict import InapplicableError, Measurement, NonconformityError, Verdict
 from protocol.conformance.wire import Event, RecordedPort, Wire
+from protocol.errors import TableError
 
 __all__ = ["Outcome", "Session", "SessionError", "session_at"]
 
@@ -46,6 +48,7 @@ class Session:
         capabilities: what cases may need and what there is.
         home_deg: where the session began, and each moving case begins.
         is_stopped: whether the table was seen to rest when it was stopped last.
+        how_it_was_left: the same in words, and where it stands or what it will do.
 
     Raises:
         SessionError: what is at the port does not answer, is no table of this protocol, or is in motion.
@@ -63,6 +66,7 @@ class Session:
         self.capabilities = capabilities(stand, profile)
         self.home_deg = round(resting_position(self._wire, profile, self._watch))
         self._is_home = self.is_stopped = False
+        self.how_it_was_left = "the table was not stopped"
         self._was_left = False
 
     def run(self, cases: Iterable[Case], report: Callable[[Outcome], None] = lambda _: None) -> list[Outcome]:
@@ -122,12 +126,16 @@ class Session:
 
     def stop(self) -> None:
         """Stop the table where it is, whatever is on the line, if it still answers."""
+        serial, motion = self._profile.serial, self._profile.motion
         self._is_home = self.is_stopped = False
-        with suppress(NonconformityError, OSError):
-            self._wire.send(CANCEL + b"R 0\r")
-            self._wire.drain(SETTLE_S + self._profile.serial.latency_s, PATIENCE_S)
-            self._rig("stop").wait_for_rest()
+        try:
+            client = TableClient(self._port, serial.timeout_s, serial.decimals, motion.acceleration_deg_s2)
+            self.how_it_was_left = f"the table was stopped, and stands at {client.stop():.6g} deg"
             self.is_stopped = True
+        except TableError as error:
+            self.how_it_was_left = str(error)
+        with suppress(OSError):
+            self._wire.drain(SETTLE_S + serial.latency_s, PATIENCE_S)
 
     def end(self) -> None:
         """Stop the table, and bring it back to where the session began, unless something broke into the session."""

@@ -10,16 +10,17 @@ from pathlib import Path
 
 from protocol.conformance.case import Case
 from protocol.conformance.catalogue import only
-from protocol.conformance.command_line import UsageError, confirm, say, show_progress, status_after, tell
+from protocol.conformance.command_line import UsageError, confirm, say, show_progress, tell
 from protocol.conformance.host_watch import watch_in
 from protocol.conformance.ports import described, is_simulated
 from protocol.conformance.profile import Profile
 from protocol.conformance.record import Header, count_verdicts, write_junit, write_record
 from protocol.conformance.report import write_report
 from protocol.conformance.stand import stand_beside
-from protocol.conformance.suite import Outcome, Session, session_at
+from protocol.conformance.suite import Outcome, session_at
 from protocol.conformance.verdict import Verdict
 from protocol.conformance.wire import RecordedPort, ReopenablePort
+from protocol.interrupts import status_after
 
 _BAD = {Verdict.FAIL, Verdict.ERROR}
 _NO_FILES = 2
@@ -48,15 +49,10 @@ def run_suite(options: argparse.Namespace, profile: Profile, port: ReopenablePor
             session.run(cases, _progress(outcomes, len(cases), options))
         except KeyboardInterrupt as interrupt:
             status = status_after(interrupt)
-            say(f"interrupted after {len(outcomes)} of {len(cases)} cases; {how_it_was_left(session)}")
+            say(f"interrupted after {len(outcomes)} of {len(cases)} cases; {session.how_it_was_left}")
     tell(", ".join(f"{count} {verdict}" for verdict, count in count_verdicts(outcomes).items()) or "nothing was run")
     written = _write(options, header, outcomes, junit)
     return status or (int(any(outcome.verdict in _BAD for outcome in outcomes)) if written else _NO_FILES)
-
-
-def how_it_was_left(session: Session) -> str:
-    """Return what became of a table whose session was broken off."""
-    return "the table was stopped" if session.is_stopped else "the table does not answer: see to it that it has stopped"
 
 
 def _junit_file(options: argparse.Namespace) -> Path:

@@ -8,7 +8,6 @@ import pytest
 
 from protocol.conformance.case import Case
 from protocol.conformance.catalogue import all_cases
-from protocol.conformance.command_line import ended_by_signals
 from protocol.conformance.fixture import pty_stand_in
 from protocol.conformance.host_watch import watch_in
 from protocol.conformance.ports import SessionError, is_simulated, open_port
@@ -18,6 +17,7 @@ from protocol.conformance.stand import StandError, stand_beside
 from protocol.conformance.suite import Session, session_at
 from protocol.conformance.verdict import Verdict
 from protocol.conformance.wire import RecordedPort
+from protocol.interrupts import ended_by_signals
 
 
 @pytest.fixture(scope="module")

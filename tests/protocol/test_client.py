@@ -1,5 +1,6 @@
 """The client's verbs, what it refuses, stopping and arrival, against a table in virtual time."""
 
+from collections.abc import Callable
 from decimal import Decimal
 
 import pytest
@@ -79,22 +80,28 @@ def test_a_dead_port_is_a_port_error() -> None:
         TableClient(DeadPort()).position_deg()
 
 
-def test_stop_is_sent_even_when_replies_are_missing() -> None:
+def test_stop_is_sent_at_once_even_when_replies_are_missing() -> None:
     client = client_in_place(port := TablePort())
     port.give_fates(*[lost] * 10)
     with pytest.raises(ReplyTimeout):
         client.move_by(90)
-    with pytest.raises(ReplyTimeout):
+    before, begun_s = len(port.heard), port.clock.now_s()
+    port.write = stopped_at(port.write, port, begun_s)  # type: ignore[method-assign] # a spy in its place
+    with pytest.raises(AssertionError, match="the stop was sent"):
         client.stop()
-    assert ("R", Decimal("0.0")) in [(heard.verb, heard.value) for heard in port.heard if isinstance(heard, Command)]
+    verbs = [heard.verb for heard in port.heard[before:] if isinstance(heard, Command)]
+    assert verbs == ["A", "A", "A", "R"]
 
 
-def test_stop_in_place_is_one_line() -> None:
-    client = client_in_place(port := TablePort())
-    before = len(port.heard)
-    client.stop()
-    assert last_said(port) == ("R", Decimal("0.0"))
-    assert len(port.heard) == before + 1
+def stopped_at(write: Callable[[bytes], int], port: TablePort, begun_s: float) -> Callable[[bytes], int]:
+    """Return a write that ends the test once `R` was sent, without any time having passed."""
+
+    def spy(data: bytes) -> int:
+        write(data)
+        assert b"R" not in data or port.clock.now_s() > begun_s, "the stop was sent"
+        return len(data)
+
+    return spy
 
 
 def test_arrival_is_two_readings_in_a_row_at_the_target() -> None:

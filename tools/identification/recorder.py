@@ -1,12 +1,10 @@
 """Run the excitation on a table and poll its position meanwhile, over any port."""
 
 from collections.abc import Callable
-from contextlib import suppress
 
 import numpy as np
 
 from protocol.client import TableClient
-from protocol.errors import TableError
 from tools.identification.excitation import Burst
 from tools.identification.lag_tracker import LagTracker, next_passage_s
 from tools.identification.recording import BITS_A_BYTE, Sent, WireRecording
@@ -32,24 +30,24 @@ def record(
         progress: Called with the share that is done.
 
     Raises:
-        TableError: The table refused a command, or went silent; it has been told to stop.
+        TableError: The table refused a command, or went silent; it was stopped, and a note says how that went.
     """
     home_deg = round(client.position_deg(), 1)
-    client.move_to(home_deg)
-    client.wait_until_at(home_deg)
-    recorder = _Recorder(client, baud, home_deg)
     length_s = sum(burst.duration_s for burst in bursts)
     try:
+        client.set_acceleration(max(burst.acceleration_deg_s2 for burst in bursts))  # a stop may take that
+        client.move_to(home_deg)
+        client.wait_until_at(home_deg)
+        recorder = _Recorder(client, baud, home_deg)
         recorder.send("S", speed_deg_s)
         recorder.read()
         for burst in bursts:
             recorder.run(burst)
             progress(min(recorder.now_s() / length_s, 1.0))
-    except BaseException:
-        with suppress(TableError):
-            client.stop()
+        client.wait_until_at(home_deg)
+    except BaseException as error:
+        error.add_note(client.stop_and_report())
         raise
-    client.wait_until_at(home_deg)
     return recorder.recording()
 
 

@@ -15,9 +15,9 @@ from emulator import drive_train
 from emulator.batch import COLUMNS, run
 from emulator.config import TableConfig
 from emulator.drive_train import DriveState, DriveTrain, at_standstill
-from emulator.patient_interrupts import interrupts_wait
 from emulator.profiler import Profile
 from emulator.tick import table_constants, woken
+from protocol.interrupts import signals_wait
 from tools.emulated import Array, Motion, motion_rows
 from tools.identification.recording import DriveRecording, WireRecording
 
@@ -96,7 +96,7 @@ def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) ->
     applied = (padded[1:] * (1.0 - share) + padded[:-1] * share) * config.driver.supply_V
     train = drive_train.drive_train(config)
     angle = np.empty(len(duty))
-    with interrupts_wait():
+    with signals_wait():
         _run_open(train, at_standstill(train, MIDDLE.gap_share), applied, angle)
     return np.degrees(angle) / config.gears.ratio
 

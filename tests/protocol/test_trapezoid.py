@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
-from protocol.conformance.trapezoid import plan
+from protocol.trapezoid import plan
 
 positions = st.floats(-400, 400)
 speeds = st.floats(-40, 40)

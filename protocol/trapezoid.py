@@ -1,6 +1,6 @@
 """The motion that clauses 7.1 and 7.3 prescribe, in closed form: what a table's reference should do.
 
-It is no table's code: phases of constant acceleration, computed at once when a motion is commanded.
+It is not the code of a table: phases of constant acceleration, computed at once when a motion is commanded.
 """
 
 import math
@@ -42,11 +42,16 @@ class Motion(NamedTuple):
         return position, speed
 
 
+def braking_way_deg(speed_deg_s: float, rate_deg_s2: float) -> float:
+    """Return the signed way from a speed to standstill: there is the nearest point at which the table can stand."""
+    return speed_deg_s * abs(speed_deg_s) / (2.0 * rate_deg_s2)
+
+
 def plan(start_deg: float, speed_deg_s: float, target_deg: float, top_deg_s: float, rate_deg_s2: float) -> Motion:
     """Return the motion to a target with top speed S and acceleration A (clauses 7.1/1, 7.1/2, 7.3/2 to 7.3/4)."""
     phases: list[Phase] = []
     position, speed = start_deg, speed_deg_s
-    braking_deg = speed * abs(speed) / (2.0 * rate_deg_s2)
+    braking_deg = braking_way_deg(speed, rate_deg_s2)
     direction = math.copysign(1.0, target_deg - position - braking_deg)
     if speed * direction < 0.0 or (speed != 0.0 and target_deg == position + braking_deg):
         phases.append(Phase(abs(speed) / rate_deg_s2, -math.copysign(rate_deg_s2, speed)))

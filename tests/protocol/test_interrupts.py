@@ -3,14 +3,14 @@ import threading
 
 import pytest
 
-from emulator.patient_interrupts import interrupts_wait
+from protocol.interrupts import signals_wait
 
 
 def test_an_interrupt_waits_until_the_block_is_done() -> None:
     reached = []
 
     def interrupted() -> None:
-        with interrupts_wait():
+        with signals_wait():
             signal.raise_signal(signal.SIGINT)
             reached.append("end of the block")
         reached.append("beyond")
@@ -22,7 +22,7 @@ def test_an_interrupt_waits_until_the_block_is_done() -> None:
 
 def test_interrupts_are_as_before_afterwards() -> None:
     former = signal.getsignal(signal.SIGINT)
-    with interrupts_wait():
+    with signals_wait():
         assert signal.getsignal(signal.SIGINT) != former
     assert signal.getsignal(signal.SIGINT) == former
 
@@ -31,7 +31,7 @@ def test_another_thread_keeps_its_hands_off_signals() -> None:
     seen = []
 
     def work() -> None:
-        with interrupts_wait():
+        with signals_wait():
             seen.append(signal.getsignal(signal.SIGINT))
 
     former = signal.getsignal(signal.SIGINT)

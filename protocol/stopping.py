@@ -1,0 +1,175 @@
+"""Stop a table that moves: brake at once, as hard as it may be braked, and wait until it stands.
+
+    A 100.0     the greatest A that the table has accepted
+    R 3.1       to the nearest point at which it can stand: v |v| / (2 A) from where its reference is
+    S 40.0      the greatest S, so that a rest of the way does not take long
+    R 2.6       the same point
+
+An increment counts from where the reference is when the table carries it out (clause 4.5/1), so nobody has to know
+where that is, nor when: the speed alone must be known. It is predicted from the commands that this client sent.
+
+Where the speed is unknown (somebody else's motion, a table that has strayed), `R 0` begins the braking: the table would
+come back to where it was. As soon as its readings show that it turns, a second `R 0` holds it there.
+"""
+
+from contextlib import suppress
+from decimal import Decimal
+
+from protocol.dialogue import Dialogue
+from protocol.errors import ArrivalTimeout, NotStopped, ReplyTimeout, TableError, UnexpectedReply
+from protocol.interrupts import signals_wait
+from protocol.messages import Angle, Command, Verb
+from protocol.predicted_reference import PredictedReference
+from protocol.standstill import Standstill
+from protocol.trapezoid import braking_way_deg
+
+BRAKING_DEG_S2 = 100.0
+"""The default table's limit of A."""
+
+# A table that refuses it is asked for the half and the quarter. Ascending, since a refused line changes nothing.
+_SHARES = (0.25, 0.5, 1.0)
+# A table of which nothing is known takes this long at most to brake.
+_LONGEST_S = 60.0
+# Beyond the reference's rest: until the readings show it.
+_SETTLING_S = 2.0
+_POLL_S = 0.01
+_ATTEMPTS = 3
+# Where nothing is known: the default table's greatest S, and its A at power-on.
+_SPEED_DEG_S, _ACCELERATION_DEG_S2 = 40.0, 20.0
+
+
+def stop(dialogue: Dialogue, braking_deg_s2: float = BRAKING_DEG_S2) -> float:
+    """Brake, wait until the table stands, and return where; signals wait as long.
+
+    S and A are those of before afterwards, where they are known.
+
+    Args:
+        dialogue: with the table.
+        braking_deg_s2: the greatest A to ask for when the table has not accepted any yet.
+
+    Raises:
+        NotStopped: the table was not seen to stand; the message says why, and what it will do.
+    """
+    before = dialogue.reference
+    with signals_wait():
+        try:
+            position_deg = _stopped(dialogue, braking_deg_s2)
+        except TableError as error:
+            raise NotStopped(
+                f"the table could not be stopped: {error}; {_what_it_will_do(before, dialogue.clock.now_s())}"
+            ) from error
+        with suppress(TableError):
+            _restore(dialogue, before)
+    return position_deg
+
+
+def standing_increment_deg(reference: PredictedReference, rate_deg_s2: float | None, time_s: float) -> float:
+    """Return the way from where a table is at a time to the nearest point at which it can stand; 0 when unknown."""
+    state = reference.at(time_s)
+    return 0.0 if state is None or not rate_deg_s2 else braking_way_deg(state[1], rate_deg_s2)
+
+
+def _stopped(dialogue: Dialogue, braking_deg_s2: float) -> float:
+    """Return where the table stands; begin anew when replies are missing, or when it does not brake as it should."""
+    for attempt in range(1, _ATTEMPTS + 1):
+        try:
+            _brake(dialogue, braking_deg_s2)
+            if _is_braked(dialogue):
+                dialogue.exchange(_command(Verb.MOVE_BY, 0.0))  # holds it there; at rest it moves nothing
+                return _resting_deg(dialogue)
+        except (ReplyTimeout, UnexpectedReply):
+            if attempt == _ATTEMPTS:
+                raise
+    raise ArrivalTimeout("the table does not brake", _position(dialogue)[0])
+
+
+def _brake(dialogue: Dialogue, braking_deg_s2: float) -> None:
+    """Begin to brake at once, then again with the greatest S: what it costs to say that must not delay the braking."""
+    rate = dialogue.greatest.get(Verb.SET_ACCELERATION)
+    if rate is None:
+        _move_to_standstill(dialogue, [_command(Verb.SET_ACCELERATION, each * braking_deg_s2) for each in _SHARES])
+        dialogue.reference = dialogue.reference._replace(acceleration_deg_s2=None)  # which of them it took is unknown
+    else:
+        is_set = rate == dialogue.reference.acceleration_deg_s2
+        _move_to_standstill(dialogue, [] if is_set else [_command(Verb.SET_ACCELERATION, rate)])
+    top = dialogue.greatest.get(Verb.SET_SPEED)
+    if top not in {None, dialogue.reference.speed_deg_s}:
+        _move_to_standstill(dialogue, [_command(Verb.SET_SPEED, top)])
+
+
+def _move_to_standstill(dialogue: Dialogue, settings: list[Command]) -> None:
+    """Send settings, and an increment that leads to where the table can stand when it has arrived."""
+    arrival_s = dialogue.arrival_s([*settings, _command(Verb.MOVE_BY, 1.0)])
+    rate = dialogue.greatest.get(Verb.SET_ACCELERATION)
+    increment_deg = standing_increment_deg(dialogue.reference, rate, arrival_s)
+    dialogue.send_at_once([*settings, _command(Verb.MOVE_BY, increment_deg)])
+
+
+def _is_braked(dialogue: Dialogue) -> bool:
+    """Return True when the table stands or turns back, False when it does not do what was predicted."""
+    rest_s = dialogue.reference.rests_s
+    rate = dialogue.reference.acceleration_deg_s2
+    top = dialogue.greatest.get(Verb.SET_SPEED, _SPEED_DEG_S)
+    longest_s = top / rate if rate else _LONGEST_S
+    deadline_s = (dialogue.clock.now_s() + longest_s if rest_s is None else rest_s) + _SETTLING_S
+    standstill: Standstill | None = None
+    while dialogue.clock.now_s() < deadline_s:
+        position_deg, step_deg = _position(dialogue)
+        standstill = standstill or Standstill(rate or _ACCELERATION_DEG_S2, step_deg)
+        standstill.take(dialogue.clock.now_s(), position_deg)
+        if rest_s is not None and dialogue.reference.rests_s is None:
+            return False
+        if dialogue.clock.now_s() >= (rest_s or 0.0) and (standstill.has_paused or standstill.has_turned):
+            return True
+        dialogue.clock.sleep_s(_POLL_S)
+    return False
+
+
+def _resting_deg(dialogue: Dialogue) -> float:
+    """Return the position once it stays the same.
+
+    Raises:
+        ArrivalTimeout: it goes on changing.
+    """
+    deadline_s = dialogue.clock.now_s() + _LONGEST_S
+    position_deg, step_deg = _position(dialogue)
+    standstill = Standstill(dialogue.reference.acceleration_deg_s2 or _ACCELERATION_DEG_S2, step_deg)
+    while not standstill.stands:
+        position_deg, _ = _position(dialogue)
+        standstill.take(dialogue.clock.now_s(), position_deg)
+        if dialogue.clock.now_s() > deadline_s:
+            raise ArrivalTimeout("the table accepted the stop and goes on turning", position_deg)
+        dialogue.clock.sleep_s(_POLL_S)
+    dialogue.rests_at(position_deg)
+    return position_deg
+
+
+def _position(dialogue: Dialogue) -> tuple[float, float]:
+    """Return the table's position, and the unit of its last decimal."""
+    reply = dialogue.exchange(Command(Verb.READ_POSITION))
+    assert isinstance(reply, Angle)
+    exponent = reply.angle_deg.as_tuple().exponent
+    assert isinstance(exponent, int)
+    return float(reply.angle_deg), 10.0**exponent
+
+
+def _restore(dialogue: Dialogue, before: PredictedReference) -> None:
+    """Set S and A to what they were, where that is known: nobody asked for others."""
+    now = dialogue.reference
+    if before.acceleration_deg_s2 not in {None, now.acceleration_deg_s2}:
+        dialogue.exchange(_command(Verb.SET_ACCELERATION, before.acceleration_deg_s2))
+    if before.speed_deg_s not in {None, now.speed_deg_s}:
+        dialogue.exchange(_command(Verb.SET_SPEED, before.speed_deg_s))
+
+
+def _what_it_will_do(before: PredictedReference, now_s: float) -> str:
+    """Return in words what becomes of a table that did not receive the stop."""
+    otherwise = "if the table did not receive the stop, it runs on to"
+    if before.target_deg is None:
+        return f"{otherwise} the target that it was given last, and stands there"
+    when = "" if before.rests_s is None else f" within {max(0.0, before.rests_s - now_s):.1f} s"
+    return f"{otherwise} its last target, {before.target_deg:g} deg, and stands there{when}"
+
+
+def _command(verb: Verb, value: float) -> Command:
+    return Command(verb, Decimal(repr(value)))
