@@ -22,6 +22,7 @@ class TableClient:
     client can be used on: it makes sure of its place before the next command.
 
     Attributes:
+        port: the port.
         clock: the clock that the port carries, else the wall clock.
     """
 
@@ -36,7 +37,7 @@ class TableClient:
             decimals: places after the point of the numbers sent.
             braking_deg_s2: the greatest A to stop a table with that has not accepted one from this client.
         """
-        self._port = port
+        self.port = port
         self._braking_deg_s2 = braking_deg_s2
         self._dialogue = Dialogue(port, timeout_s, decimals)
         self.clock = self._dialogue.clock
@@ -70,7 +71,7 @@ class TableClient:
 
     def close(self) -> None:
         """Close the port."""
-        self._port.close()
+        self.port.close()
 
     def position_deg(self) -> float:
         """Return the present position, as the encoder has it (H)."""

@@ -26,8 +26,8 @@ from protocol.trapezoid import braking_way_deg
 BRAKING_DEG_S2 = 100.0
 """The default table's limit of A."""
 
-# A table that refuses it is asked for the half and the quarter. Ascending, since a refused line changes nothing.
-_SHARES = (0.25, 0.5, 1.0)
+# A table that may refuse it is asked for it first, then for less. Ascending, since a refused line changes nothing.
+_SHARES = ((1.0,), (0.25, 0.5, 1.0))
 # A table of which nothing is known takes this long at most to brake.
 _LONGEST_S = 60.0
 # Beyond the reference's rest: until the readings show it.
@@ -87,7 +87,9 @@ def _brake(dialogue: Dialogue, braking_deg_s2: float) -> None:
     """Begin to brake at once, then again with the greatest S: what it costs to say that must not delay the braking."""
     rate = dialogue.greatest.get(Verb.SET_ACCELERATION)
     if rate is None:
-        _move_to_standstill(dialogue, [_command(Verb.SET_ACCELERATION, each * braking_deg_s2) for each in _SHARES])
+        for shares in _SHARES:
+            asked = [_command(Verb.SET_ACCELERATION, share * braking_deg_s2) for share in shares]
+            _move_to_standstill(dialogue, asked)
         dialogue.reference = dialogue.reference._replace(acceleration_deg_s2=None)  # which of them it took is unknown
     else:
         is_set = rate == dialogue.reference.acceleration_deg_s2

@@ -1,0 +1,183 @@
+"""Stopping a table in virtual time: how far it goes on, how long it takes, and what it must not do."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import emulator  # noqa: F401 - teaches pyserial the port emulator://
+from protocol import TableClient
+
+FASTEST, HARDEST = 40.0, 100.0
+
+
+@dataclass
+class Stopped:
+    """What the reference did from the moment of the stop on."""
+
+    speed_deg_s: float
+    rate_deg_s2: float
+    way_deg: float
+    back_deg: float
+    rest_s: float
+    position_deg: float
+    end_deg: float
+
+    @property
+    def beyond_deg(self) -> float:
+        """How much farther than from the present speed at the greatest A."""
+        return self.way_deg - self.speed_deg_s**2 / (2 * self.rate_deg_s2)
+
+    @property
+    def beyond_s(self) -> float:
+        return self.rest_s - abs(self.speed_deg_s) / self.rate_deg_s2
+
+
+def stopped(client: TableClient, table: Any, rate_deg_s2: float = HARDEST) -> Stopped:  # noqa: ANN401 - a port's table
+    """Stop a table, and return what its reference did."""
+    before = table.status()
+    seen = [before]
+    table.observer = lambda status, _heard, _said: seen.append(status)
+    position_deg = client.stop()
+    table.observer = None
+    forward = -1.0 if before.reference_speed_deg_s < 0 else 1.0
+    ways = [forward * (each.reference_deg - before.reference_deg) for each in seen]
+    moving = [each.tick for each in seen if each.reference_speed_deg_s]
+    rest_s = (max(moving, default=before.tick) - before.tick) / 1000
+    speed_deg_s = abs(before.reference_speed_deg_s)
+    end_deg = seen[-1].reference_deg
+    return Stopped(speed_deg_s, rate_deg_s2, max(ways), max(ways) - ways[-1], rest_s, position_deg, end_deg)
+
+
+def check(one: Stopped) -> None:
+    assert one.beyond_deg <= 1.0
+    assert one.beyond_s <= 0.5
+    assert one.back_deg <= 1.0
+    assert one.position_deg == pytest.approx(one.end_deg, abs=0.1)
+
+
+def table_at_rest(
+    url: str = "emulator://", decimals: int = 1, rate: float = HARDEST, baud: int = 9600
+) -> tuple[TableClient, Any]:
+    """Return a table that rests, and has accepted its greatest S and A."""
+    client = TableClient.open(url, baud or 9600, decimals=decimals)
+    client.set_speed(FASTEST)
+    client.set_acceleration(rate)
+    client.move_to(0)
+    client.wait_until_at(0)
+    return client, client.port.table  # type: ignore[attr-defined]  # the simulated one
+
+
+@pytest.mark.parametrize("acceleration", [0.1, 1.0, 5.0, 20.0, 100.0])
+@pytest.mark.parametrize("after_s", [0.05, 1.0, 6.0, 30.0])
+def test_it_stands_as_soon_as_it_can_whatever_acceleration_is_in_force(acceleration: float, after_s: float) -> None:
+    client, table = table_at_rest()
+    client.set_acceleration(acceleration)
+    client.move_to(1200)
+    client.clock.sleep_s(after_s)
+    check(stopped(client, table))
+
+
+@pytest.mark.parametrize("speed", [0.1, 1.0, 10.0, 40.0])
+def test_a_low_top_speed_does_not_make_it_creep(speed: float) -> None:
+    client, table = table_at_rest()
+    client.set_speed(speed)
+    client.move_to(300)
+    client.clock.sleep_s(2.0)
+    check(stopped(client, table))
+
+
+def test_the_speed_may_just_have_been_lowered() -> None:
+    client, table = table_at_rest()
+    client.move_to(300)
+    client.clock.sleep_s(2.0)
+    client.set_speed(0.1)
+    client.set_acceleration(0.1)
+    client.move_to(300)
+    client.clock.sleep_s(0.1)
+    check(stopped(client, table))
+
+
+def test_a_table_that_turns_back_is_stopped_on_its_way_back() -> None:
+    client, table = table_at_rest()
+    client.set_acceleration(10.0)
+    client.move_to(100)
+    client.clock.sleep_s(3.0)
+    client.move_to(0)
+    for wait_s in (0.5, 3.5):
+        client.clock.sleep_s(wait_s)
+        client.clock.sleep_s(0.0)
+    assert table.status().reference_speed_deg_s < 0
+    check(stopped(client, table))
+
+
+def test_a_table_at_rest_is_not_moved() -> None:
+    client, table = table_at_rest()
+    client.move_to(12.3)
+    client.wait_until_at(12.3)
+    client.clock.sleep_s(1.0)
+    before = table.status().true_deg
+    one = stopped(client, table)
+    assert one.way_deg == one.back_deg == 0.0
+    assert table.status().true_deg == before
+
+
+def test_speed_and_acceleration_are_what_they_were_before() -> None:
+    client, table = table_at_rest()
+    client.set_speed(7.0)
+    client.set_acceleration(3.0)
+    client.move_to(50)
+    client.clock.sleep_s(1.0)
+    client.stop()
+    begun_s = client.clock.now_s()
+    client.move_by(21.0)
+    client.clock.sleep_s(2.0)
+    assert table.status().reference_speed_deg_s == pytest.approx(6.0, abs=0.2)
+    assert client.clock.now_s() - begun_s < 3.0
+
+
+@pytest.mark.parametrize("speed", [1.0, 5.0, 12.0, 20.0, 40.0])
+@pytest.mark.parametrize("decimals", [1, 3])
+def test_a_motion_of_which_nothing_is_known_is_stopped_too(speed: float, decimals: int) -> None:
+    other, table = table_at_rest(f"emulator://?decimals={decimals}")
+    other.set_speed(speed)
+    other.move_to(1000)
+    other.clock.sleep_s(1.5)
+    check(stopped(TableClient(other.port, decimals=decimals), table))
+
+
+def test_a_table_that_refuses_the_acceleration_asked_for_is_stopped_with_less(tmp_path: Path) -> None:
+    config = tmp_path / "table.toml"
+    config.write_text("[limits]\nacceleration_deg_s2 = 30.0\n")
+    client = TableClient.open(f"emulator://?config={config}")
+    client.set_speed(FASTEST)
+    client.move_to(1000)
+    client.clock.sleep_s(4.0)
+    one = stopped(client, client.port.table, 25.0)  # type: ignore[attr-defined]
+    assert one.beyond_deg <= 1.0
+    assert one.back_deg <= 1.0
+
+
+@settings(max_examples=60)
+@given(data=st.data())
+def test_any_motion_on_any_table_is_stopped(data: st.DataObject, tmp_path_factory: pytest.TempPathFactory) -> None:
+    draw = data.draw
+    rate = draw(st.sampled_from([10.0, 40.0, 100.0]), "greatest A")
+    baud = draw(st.sampled_from([0, 4800, 9600, 19200, 115200]), "baud")
+    decimals = draw(st.integers(1, 4), "decimals")
+    config = tmp_path_factory.mktemp("table") / "table.toml"
+    config.write_text(f"[limits]\nacceleration_deg_s2 = {rate}\n[power_on]\nacceleration_deg_s2 = {min(rate, 20.0)}\n")
+    client, table = table_at_rest(f"emulator://?config={config}&baud={baud}&decimals={decimals}", decimals, rate, baud)
+    for _ in range(draw(st.integers(1, 5), "motions")):
+        client.set_speed(draw(st.integers(1, 400)) / 10)
+        client.set_acceleration(draw(st.integers(1, round(10 * rate))) / 10)
+        client.move_to(draw(st.integers(-3000, 3000)) / 10)
+        client.clock.sleep_s(draw(st.integers(0, 5000)) / 1000)
+    one = stopped(client, table, rate)
+    late_deg = 0.03 * one.speed_deg_s if baud == 4800 else 0.0  # the lines take twice as long
+    assert one.beyond_deg <= 1.0 + late_deg
+    assert one.beyond_s <= 0.5
+    assert one.back_deg <= 1.0
