@@ -11,7 +11,8 @@ from protocol.conformance.stand import Stand
 from protocol.conformance.wire import CR, Event, Wire
 
 _ANGLE = re.compile(rb"([HL]) (-?[0-9]+\.[0-9]+)")
-_AFTER_S = 0.3
+AFTER_S = 0.3
+"""From the last event of a case until the next case begins."""
 _MOMENT_S = 0.001
 
 
@@ -47,7 +48,7 @@ def replay(case: RecordedCase, wire: Wire, stand: Stand, profile: Profile) -> Pa
         while event.direction == "beside" and heard.count(CR) < due and wire.clock.now_s() < latest_s:
             heard += wire.listen(_MOMENT_S)  # a table that is switched off now would lose what had come by now then
         _do(event, wire, stand)
-    heard += wire.listen(case.wire[-1].time_s - origin_s - (wire.clock.now_s() - begin_s) + _AFTER_S)
+    heard += wire.listen(case.wire[-1].time_s - origin_s - (wire.clock.now_s() - begin_s) + AFTER_S)
     tolerance = profile.tolerance.tracking_deg + profile.resolution_deg
     tolerance += profile.serial.latency_s * profile.motion.speed_deg_s
     return _parting(case.wire, bytes(heard), tolerance)

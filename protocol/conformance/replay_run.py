@@ -11,8 +11,9 @@ from protocol.conformance.ports import SessionError
 from protocol.conformance.profile import Profile
 from protocol.conformance.record import Record, read_record
 from protocol.conformance.replay import replay
+from protocol.conformance.replay_check import Misfit, check
 from protocol.conformance.stand import Stand, stand_beside
-from protocol.conformance.suite import session_at
+from protocol.conformance.suite import Session, session_at
 from protocol.conformance.wire import RecordedPort, ReopenablePort, Wire
 
 
@@ -27,6 +28,9 @@ def run_replay(options: argparse.Namespace, profile: Profile, port: ReopenablePo
     """
     record = _wanted(read_record(options.replay), cases, options.replay)
     _check_reach(record.profile, profile, options.replay)
+    starts_deg = check(record.cases, record.home_deg, profile)
+    if isinstance(starts_deg, Misfit):
+        raise UsageError(f"{options.replay}: {starts_deg}; nothing was sent, choose other cases with --case")
     stand = stand_beside(port, options.control, profile)
     confirm(options.port, options.yes, profile, port)
     recorded_port = RecordedPort(port)
@@ -36,7 +40,7 @@ def run_replay(options: argparse.Namespace, profile: Profile, port: ReopenablePo
             f"the table stands at {session.home_deg} deg, the record began at {record.home_deg}; bring it there first"
         )
     try:
-        parted = _send(record, Wire(recorded_port), stand, profile)
+        parted = _send(record, starts_deg, session, Wire(recorded_port), stand, profile)
         session.end()
     except BaseException:
         session.stop()
@@ -46,10 +50,17 @@ def run_replay(options: argparse.Namespace, profile: Profile, port: ReopenablePo
     return int(parted > 0)
 
 
-def _send(record: Record, wire: Wire, stand: Stand, profile: Profile) -> int:
-    """Replay each case, and return how many part."""
+def _send(
+    record: Record, starts_deg: Sequence[float], session: Session, wire: Wire, stand: Stand, profile: Profile
+) -> int:
+    """Replay each case from where it has to begin, and return how many part.
+
+    Raises:
+        SessionError: the table is elsewhere, so it carried out what it has to refuse; or it refuses S or A.
+    """
     parted = 0
-    for case in record.cases:
+    for case, start_deg in zip(record.cases, starts_deg, strict=True):
+        session.begin_replay(case.id, start_deg)
         parting = replay(case, wire, stand, profile)
         parted += parting is not None
         tell(f"{'parts' if parting else 'same':9} {case.id}{f': {parting}' if parting else ''}")

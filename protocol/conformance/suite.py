@@ -8,7 +8,7 @@ from random import Random
 
 from protocol.client import TableClient
 from protocol.conformance.case import Case
-from protocol.conformance.first_contact import PATIENCE_S, SETTLE_S, resting_position
+from protocol.conformance.first_contact import CANCEL, PATIENCE_S, SETTLE_S, resting_position
 from protocol.conformance.host_watch import Punctual, Watch
 from protocol.conformance.ports import SessionError
 from protocol.conformance.profile import Profile
@@ -23,6 +23,8 @@ __all__ = ["Outcome", "Session", "SessionError", "session_at"]
 
 _RUNS = 3
 """How often a case is run when its machine spoils it."""
+_START_DEG = 0.75
+"""A recorded case begins within this of its place: it may begin half a degree from a whole one."""
 _LONGEST_REASON = 1000
 """Of a reason that is longer, beginning and end are kept: a table may say anything."""
 
@@ -136,6 +138,26 @@ class Session:
             self.how_it_was_left = str(error)
         with suppress(OSError):
             self._wire.drain(SETTLE_S + serial.latency_s, PATIENCE_S)
+
+    def begin_replay(self, case: str, start_deg: float) -> None:
+        """Set S and A to the profile's greatest before a recorded case, and see that the table stands where it should.
+
+        Raises:
+            SessionError: it does not, or it does not answer as it should.
+        """
+        rig = self._rig("replay")
+        self._wire.send(CANCEL)
+        self._wire.drain(SETTLE_S + self._profile.serial.latency_s, PATIENCE_S)
+        try:
+            rig.full_settings()
+            position_deg = float(rig.read())
+        except NonconformityError as error:
+            raise SessionError(f"before case {case}: {error}") from error
+        if abs(position_deg - start_deg) > _START_DEG:
+            raise SessionError(
+                f"before case {case} the table is at {position_deg:g} deg and should be at {start_deg:g}:"
+                " it carried out what it has to refuse, or it has not come to rest"
+            )
 
     def end(self) -> None:
         """Stop the table, and bring it back to where the session began, unless something broke into the session."""

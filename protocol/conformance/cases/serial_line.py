@@ -80,6 +80,8 @@ def a_line_that_lost_bytes_is_a_bad_byte(rig: Rig) -> None:
     count = 5 * rig.profile.serial.buffer_bytes // 2
     rig.wire.send(b"H\r" * count)
     heard = rig.drain().split(b"\r")
+    rig.wire.send(b"\r")  # ends what may be a torn line: the next case begins without it
+    rig.drain()
     require(heard.pop() == b"", "the last reply has no CR")
     strange = [line for line in heard if not line.startswith((b"H ", b"ERR 5 "))]
     require(not strange, f"lines that lost bytes were read as others: {strange[:3]}")

@@ -10,6 +10,8 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
+from emulator.protocol_emulator import Serial
+from emulator.table import Table
 from protocol.conformance.__main__ import main
 
 ROOT = Path(__file__).parents[3]
@@ -251,3 +253,61 @@ def test_a_record_of_a_livelier_table_is_not_sent(
     profile.write_text("[motion]\nspeed_deg_s = 5\n")
     assert conformance("--port", "emulator://", "--profile", profile, "--replay", record) == 2
     assert "was recorded with motion.speed_deg_s 40; the profile allows 5" in capsys.readouterr().err
+
+
+def hostile(record: Path, *lines: str) -> None:
+    """Let a record claim a profile of 1 deg, and hide other lines in its first case."""
+    changed = json.loads(record.read_text())
+    changed["profile"]["motion"]["reach_deg"] = 1.0
+    case = next(case for case in changed["cases"] if case["wire"])
+    case["wire"] = [[float(index), "sent", line] for index, line in enumerate(lines)]
+    changed["cases"] = [case]
+    record.write_text(json.dumps(changed))
+
+
+@pytest.mark.parametrize(
+    ("lines", "named"),
+    [
+        (["S 40\r", "A 10\r", "P 2999.998\r"], "b'S 40' of case"),
+        (["S 2\r", "A 10\r", "P 2999.998\r"], "b'P 2999.998' of case"),
+        (["S 2\r", "A 10\r", *["R 4.9\r"] * 9], "b'R 4.9' of case"),
+        (["S 2\r", "A 10\r", "p 3000\r"], "b'p 3000' of case"),
+    ],
+)
+def test_a_record_that_hides_a_motion_is_refused_before_anything_is_sent(
+    lines: list[str],
+    named: str,
+    record: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    hostile(record, *lines)
+    profile = tmp_path / "careful.toml"
+    profile.write_text("[motion]\nreach_deg = 5\nspeed_deg_s = 2\nacceleration_deg_s2 = 10\n")
+    written: list[bytes] = []
+    monkeypatch.setattr(Serial, "write", lambda _, data: written.append(bytes(data)))
+    capsys.readouterr()
+    assert conformance("--port", "emulator://", "--profile", profile, "--replay", record) == 2
+    said = capsys.readouterr().err
+    assert named in said
+    assert said.count("\n") == 1
+    assert written == []
+
+
+def test_a_replay_ends_when_a_table_has_carried_out_what_it_must_refuse(
+    record: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A table that knows small letters is moved by a line that fits, and the next case would begin elsewhere."""
+    changed = json.loads(record.read_text())
+    names = [case["id"] for case in changed["cases"] if case["wire"]][:2]
+    changed["cases"] = [
+        {"id": names[0], "wire": [[0.0, "sent", "p 30\r"], [9.0, "sent", "H\r"]]},
+        {"id": names[1], "wire": [[0.0, "sent", "R 380\r"]]},
+    ]
+    record.write_text(json.dumps(changed))
+    receive = Table.receive
+    monkeypatch.setattr(Table, "receive", lambda table, data: receive(table, data.replace(b"p", b"P")))
+    capsys.readouterr()
+    assert conformance("--port", "emulator://", "--replay", record) == 2
+    assert f"before case {names[1]} the table is at 30 deg and should be at 0" in capsys.readouterr().err

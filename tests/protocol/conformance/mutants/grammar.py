@@ -28,7 +28,7 @@ class TakesExponents(Mutant):
     """numbers are read as a programming language reads them"""
 
     def receive(self, data: bytes) -> None:
-        super().receive(re.sub(rb"1e4\r", b"10000\r", data))
+        super().receive(re.sub(rb"1e1\r", b"10\r", data))
 
 
 @caught_by("4.1/8")
