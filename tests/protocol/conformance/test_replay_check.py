@@ -88,7 +88,7 @@ MISFITS = {
         beside(9.0, b"preset 512000"),
         Event(10.0, "sent", b"S 2\rA 2\rP 1\r"),
     ],
-    "times that go back": [Event(9.0, "sent", b"R 3\r"), *sent(b"R 3\r", b"R 3\r", every_s=0.1)],
+    "times that go back": [*sent(b"P 5\r", b"A 0.01\r", every_s=0.9), *sent(b"P 4\r")],
     "a flood that glues lines": sent(b"P 3\r" + b"H\r" * 60 + b"R 0.000\r" * 20),
     "a flood of many different lines": sent(b"".join(b"R 0.%02d\r" % number for number in range(90))),
 }
@@ -115,8 +115,9 @@ def test_each_case_begins_where_the_one_before_ended(careful: Profile) -> None:
     assert starts == [0.0, 3.0, 1.0]
 
 
-def test_no_case_may_begin_while_the_table_moves(careful: Profile) -> None:
-    assert isinstance(found(careful, sent(b"P 3\r"), sent(b"H\r")), Misfit)
+def test_each_case_begins_at_rest(careful: Profile) -> None:
+    assert found(careful, sent(b"P 3\r"), sent(b"R 1.5\r"), sent(b"H\r")) == [0.0, 3.0, 4.5]
+    assert isinstance(found(careful, sent(b"P 3\r"), sent(b"R 3\r")), Misfit)
 
 
 @given(st.lists(st.tuples(st.floats(-60.0, 60.0), st.floats(0.0, 2.0)), min_size=1, max_size=12))
