@@ -41,6 +41,7 @@ class Dialogue:
 
     Attributes:
         clock: that of the port.
+        decimals: places after the point of the numbers sent.
         reference: where the commands that were sent have brought the table's reference. A command whose reply is
             missing counts as carried out.
         greatest: the greatest S and the greatest A that the table has accepted.
@@ -52,7 +53,7 @@ class Dialogue:
         self._port = port
         self._port.timeout = timeout_s
         self._timeout_s = timeout_s
-        self._decimals = decimals
+        self.decimals = decimals
         self.reference = PredictedReference()
         self.greatest: dict[Verb, float] = {}
         self._byte_s: float | None = None
@@ -76,7 +77,7 @@ class Dialogue:
             PortError: the port has died.
             ProtocolMisuse: the protocol cannot say this command; nothing was sent.
         """
-        sent = encode_command(command, self._decimals)
+        sent = encode_command(command, self.decimals)
         if self.has_lost_its_place:
             self._find_place()
         before, sent_s = self.reference, self.clock.now_s()
@@ -123,7 +124,7 @@ class Dialogue:
         return _CANCEL if self._may_hold_half_line else b""
 
     def _lines_of(self, commands: Sequence[Command]) -> list[bytes]:
-        return [encode_command(command, self._decimals) for command in commands]
+        return [encode_command(command, self.decimals) for command in commands]
 
     def _passed_s(self, data: bytes) -> float:
         """Return when bytes that are sent now have passed the line."""

@@ -13,7 +13,7 @@ come back to where it was. As soon as its readings show that it turns, a second 
 """
 
 from contextlib import suppress
-from decimal import Decimal
+from decimal import ROUND_DOWN, Decimal
 
 from protocol.dialogue import Dialogue
 from protocol.errors import ArrivalTimeout, NotStopped, ReplyTimeout, TableError, UnexpectedReply
@@ -103,8 +103,10 @@ def _move_to_standstill(dialogue: Dialogue, settings: list[Command]) -> None:
     """Send settings, and an increment that leads to where the table can stand when it has arrived."""
     arrival_s = dialogue.arrival_s([*settings, _command(Verb.MOVE_BY, 1.0)])
     rate = dialogue.greatest.get(Verb.SET_ACCELERATION)
-    increment_deg = standing_increment_deg(dialogue.reference, rate, arrival_s)
-    dialogue.send_at_once([*settings, _command(Verb.MOVE_BY, increment_deg)])
+    increment_deg = Decimal(repr(standing_increment_deg(dialogue.reference, rate, arrival_s)))
+    # Rounded towards the table: it rather comes back by a digit than goes on for one.
+    rounded_deg = increment_deg.quantize(Decimal(1).scaleb(-dialogue.decimals), ROUND_DOWN)
+    dialogue.send_at_once([*settings, Command(Verb.MOVE_BY, rounded_deg)])
 
 
 def _is_braked(dialogue: Dialogue) -> bool:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from planner.__main__ import main as planner
 from protocol import TableError
+from tools.command_line import ended
 from tools.preemption import draw_preemption, stand_in
 
 SCAN = "cylinder"
@@ -32,15 +33,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("job", choices=("scan", "preemption"), nargs="?", default="scan", help="default: scan")
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="where the results go")
     options = parser.parse_args(arguments)
-    try:
-        options.out.mkdir(parents=True, exist_ok=True)
-        if options.job == "preemption":
-            print(draw_preemption(options.out))
-            return 0
-        return scan_on_a_pty(options.out)
-    except (OSError, TableError) as error:
-        print(f"demo: {error}", file=sys.stderr)
-        return 2
+    return ended("demo", lambda: _run(options), TableError)
+
+
+def _run(options: argparse.Namespace) -> int:
+    options.out.mkdir(parents=True, exist_ok=True)
+    if options.job == "preemption":
+        print(draw_preemption(options.out))
+        return 0
+    return scan_on_a_pty(options.out)
 
 
 def scan_on_a_pty(out: Path) -> int:

@@ -31,6 +31,7 @@ from planner.planning.ray_shooting import Rays, cheapest_ray, no_cost_to_go, ray
 from planner.table.cost import Weights
 from planner.table.motion import Limits, limited_acceleration, next_angle, next_speed
 from planner.whole_file import whole_file
+from tools.command_line import ended
 
 RAY_COLOUR = "#7fb2e5"
 
@@ -242,6 +243,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if unknown:
         print(f"there is no figure {unknown[0]!r}; allowed are {', '.join(FIGURES)}", file=sys.stderr)
         return 2
+    return ended("figures", lambda: _draw(options))
+
+
+def _draw(options: argparse.Namespace) -> int:
     try:
         options.out.mkdir(parents=True, exist_ok=True)
         for name in options.names or FIGURES:

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from emulator.trace import Trace, read_trace
 from planner.whole_file import whole_file
 from protocol import LineBuffer
+from tools.command_line import ended
 
 _EXAMPLE = """example:
   python -m emulator --pty --trace run.csv
@@ -101,11 +102,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("trace", metavar="TRACE", type=Path, help="a .csv or .npz file of python -m emulator --trace")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="the picture: .png, .svg or .pdf")
     options = parser.parse_args(arguments)
-    try:
-        save_figure(draw_trace(read_trace(options.trace), options.trace.name), options.out)
-    except (OSError, ValueError) as error:
-        print(f"plot_trace: {error}", file=sys.stderr)
-        return 2
+    return ended("plot_trace", lambda: _draw(options), ValueError)
+
+
+def _draw(options: argparse.Namespace) -> int:
+    save_figure(draw_trace(read_trace(options.trace), options.trace.name), options.out)
     return 0
 
 

@@ -53,9 +53,12 @@ def _drive(table: TableClient) -> None:
 
 @contextmanager
 def stand_in(*arguments: str) -> Iterator[str]:
-    """Run the stand-in as a program of its own and yield its port's name; what it records is complete afterwards."""
+    """Run the stand-in as a program of its own and yield its port's name; what it records is complete afterwards.
+
+    Ctrl-C at the terminal does not reach it: the table has to be there to be stopped.
+    """
     command = [sys.executable, "-m", "emulator", *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
         assert process.stdout is not None
         try:
             yield process.stdout.readline().strip()

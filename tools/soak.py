@@ -19,6 +19,7 @@ from emulator.table import Table
 from protocol.client import TableClient
 from protocol.codec import decode_reply
 from protocol.messages import Angle, Ok, Refusal
+from tools.command_line import ended
 
 _TICK_HZ = 1000
 
@@ -157,6 +158,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--seed", type=int, default=0, metavar="N", help="seed of all that is left to chance (default 0)"
     )
     options = parser.parse_args(arguments)
+    return ended("soak", lambda: _run(options))
+
+
+def _run(options: argparse.Namespace) -> int:
     failed = False
     for name in options.name:
         run, full, unit = SOAKS[name]

@@ -9,12 +9,18 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-SUBJECTS = ("emulator", "identify", "map", "planner", "scan", "stream")
+from tools.command_line import ended
+
+SUBJECTS = ("emulator", "identify", "map", "planner", "scan", "stop", "stream")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the named benchmarks and print their tables."""
     options = _parser().parse_args(arguments)
+    return ended("bench", lambda: _run(options))
+
+
+def _run(options: argparse.Namespace) -> int:
     for subject in options.subject:
         bench = import_module(f"tools.bench.{subject}").bench  # each needs libraries that the others do not
         if subject == "identify":
