@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
-from protocol import TableClient
+from emulator.faults import fault_from
+from protocol import NotStopped, TableClient
 
 FASTEST, HARDEST = 40.0, 100.0
 
@@ -181,3 +182,61 @@ def test_any_motion_on_any_table_is_stopped(data: st.DataObject, tmp_path_factor
     assert one.beyond_deg <= 1.0 + late_deg
     assert one.beyond_s <= 0.5
     assert one.back_deg <= 1.0
+
+
+def test_a_dead_line_is_told_with_what_the_table_will_do() -> None:
+    client, table = table_at_rest()
+    client.set_acceleration(5)
+    client.move_to(300)
+    client.clock.sleep_s(2.0)
+    table.inject(fault_from("hang-up", {}))
+    with pytest.raises(
+        NotStopped,
+        match=r"the device has gone.*it runs on to its last target, 300 deg, and stands there within 13\.\d s$",
+    ):
+        client.stop()
+
+
+def test_a_silent_table_is_told_and_has_heard_the_stop() -> None:
+    client, table = table_at_rest()
+    client.move_to(300)
+    client.clock.sleep_s(2.0)
+    before = table.status().reference_deg
+    table.inject(fault_from("silence", {}))
+    with pytest.raises(NotStopped, match=r"no reply to it within 1 s.*its last target, 300 deg"):
+        client.stop()
+    assert table.status().state == "idle"
+    assert before + 8 <= table.status().reference_deg <= before + 9
+
+
+def test_the_stop_is_carried_out_though_its_first_replies_are_lost() -> None:
+    client, table = table_at_rest()
+    client.move_to(300)
+    client.clock.sleep_s(2.0)
+    table.inject(fault_from("silence", {"for_s": 0.7}))
+    one = stopped(client, table)
+    check(one)
+
+
+def test_a_table_that_answers_half_a_second_late_is_stopped_as_soon() -> None:
+    client, table = table_at_rest()
+    table.inject(fault_from("delay", {"seconds": 0.5}))
+    client.set_acceleration(20)
+    client.move_to(300)
+    client.clock.sleep_s(3.0)
+    check(stopped(client, table))
+
+
+def test_a_stalled_table_is_not_pushed_on() -> None:
+    client, table = table_at_rest()
+    client.set_speed(20)
+    client.move_to(300)
+    client.clock.sleep_s(1.0)
+    table.inject(fault_from("stall", {}))
+    for _ in range(20):
+        client.position_deg()
+        client.clock.sleep_s(0.05)
+    before = table.status().true_deg
+    table.clear_faults()
+    assert client.stop() == pytest.approx(before, abs=0.3)
+    assert table.status().true_deg == pytest.approx(before, abs=0.3)
