@@ -33,6 +33,8 @@ _LONGEST_S = 60.0
 # Beyond the reference's rest: until the readings show it.
 _SETTLING_S = 2.0
 _POLL_S = 0.01
+# A table that answers late is asked so often, however long that takes.
+_READINGS = 4
 _ATTEMPTS = 3
 # Where nothing is known: the default table's greatest S, and its A at power-on.
 _SPEED_DEG_S, _ACCELERATION_DEG_S2 = 40.0, 20.0
@@ -115,17 +117,21 @@ def _is_braked(dialogue: Dialogue) -> bool:
     rate = dialogue.reference.acceleration_deg_s2
     top = dialogue.greatest.get(Verb.SET_SPEED, _SPEED_DEG_S)
     longest_s = top / rate if rate else _LONGEST_S
-    deadline_s = (dialogue.clock.now_s() + longest_s if rest_s is None else rest_s) + _SETTLING_S
-    standstill: Standstill | None = None
+    latest_s = dialogue.clock.now_s() + longest_s if rest_s is None else rest_s
+    _, step_deg = _position(dialogue)
+    asked_s = dialogue.clock.now_s()
+    position_deg, _ = _position(dialogue)
+    reading_s = dialogue.clock.now_s() - asked_s
+    deadline_s = max(latest_s, dialogue.clock.now_s()) + _SETTLING_S + _READINGS * reading_s
+    standstill = Standstill(rate or _ACCELERATION_DEG_S2, step_deg)
     while dialogue.clock.now_s() < deadline_s:
-        position_deg, step_deg = _position(dialogue)
-        standstill = standstill or Standstill(rate or _ACCELERATION_DEG_S2, step_deg)
         standstill.take(dialogue.clock.now_s(), position_deg)
         if rest_s is not None and dialogue.reference.rests_s is None:
             return False
         if dialogue.clock.now_s() >= (rest_s or 0.0) and (standstill.has_paused or standstill.has_turned):
             return True
         dialogue.clock.sleep_s(_POLL_S)
+        position_deg, _ = _position(dialogue)
     return False
 
 

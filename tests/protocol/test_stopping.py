@@ -218,9 +218,11 @@ def test_the_stop_is_carried_out_though_its_first_replies_are_lost() -> None:
     check(one)
 
 
-def test_a_table_that_answers_half_a_second_late_is_stopped_as_soon() -> None:
-    client, table = table_at_rest()
-    table.inject(fault_from("delay", {"seconds": 0.5}))
+@pytest.mark.parametrize("delay_s", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("decimals", [1, 3])
+def test_a_table_that_answers_late_is_stopped_as_soon(delay_s: float, decimals: int) -> None:
+    client, table = table_at_rest(f"emulator://?decimals={decimals}", decimals)
+    table.inject(fault_from("delay", {"seconds": delay_s}))
     client.set_acceleration(20)
     client.move_to(300)
     client.clock.sleep_s(3.0)
