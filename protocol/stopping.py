@@ -82,7 +82,8 @@ def _stopped(dialogue: Dialogue, braking_deg_s2: float) -> float:
         except (ReplyTimeout, UnexpectedReply):
             if attempt == _ATTEMPTS:
                 raise
-    raise ArrivalTimeout("the table does not brake", _position(dialogue)[0])
+    position_deg, _ = _position(dialogue)
+    raise ArrivalTimeout(f"the table is at {position_deg:g} deg and goes on turning", position_deg)
 
 
 def _brake(dialogue: Dialogue, braking_deg_s2: float) -> None:
@@ -148,7 +149,7 @@ def _resting_deg(dialogue: Dialogue) -> float:
         position_deg, _ = _position(dialogue)
         standstill.take(dialogue.clock.now_s(), position_deg)
         if dialogue.clock.now_s() > deadline_s:
-            raise ArrivalTimeout("the table accepted the stop and goes on turning", position_deg)
+            raise ArrivalTimeout(f"the table is at {position_deg:g} deg and goes on turning", position_deg)
         dialogue.clock.sleep_s(_POLL_S)
     dialogue.rests_at(position_deg)
     return position_deg
