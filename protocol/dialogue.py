@@ -100,10 +100,10 @@ class Dialogue:
     def send_at_once(self, commands: Sequence[Command]) -> None:
         """Send commands in one write, even when replies are missing; their own are not waited for."""
         lines, arrival_s = self._lines_of(commands), self.arrival_s(commands)
-        for command, line in zip(commands, lines, strict=True):
-            self._unanswered[command.verb] += 1
-            self._take_for_carried_out(line, arrival_s)
+        self._unanswered.update(command.verb for command in commands)
         self._write(b"".join((self._cancel, *lines)))
+        for line in lines:
+            self._take_for_carried_out(line, arrival_s)
 
     def arrival_s(self, commands: Sequence[Command]) -> float:
         """Return when commands that are sent at once have arrived at the table."""
@@ -166,8 +166,9 @@ class Dialogue:
         self._lines.discard()
         self._last_line = "nothing"
         self._unanswered[verb] += 1
-        self._take_for_carried_out(line, self._passed_s(line))
+        arrival_s = self._passed_s(line)
         self._write(line)
+        self._take_for_carried_out(line, arrival_s)
 
     def _take_for_carried_out(self, line: bytes, time_s: float) -> None:
         self.reference = self.reference.after(_command_in(line), time_s)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from emulator.faults import fault_from
-from protocol import NotStopped, TableClient
+from protocol import NotStopped, PortError, TableClient
 
 FASTEST, HARDEST = 40.0, 100.0
 
@@ -242,3 +242,15 @@ def test_a_stalled_table_is_not_pushed_on() -> None:
     table.clear_faults()
     assert client.stop() == pytest.approx(before, abs=0.3)
     assert table.status().true_deg == pytest.approx(before, abs=0.3)
+
+
+def test_a_target_that_was_not_sent_is_not_told() -> None:
+    client, table = table_at_rest()
+    client.set_acceleration(5)
+    client.move_to(300)
+    client.clock.sleep_s(2.0)
+    table.inject(fault_from("hang-up", {}))
+    with pytest.raises(PortError):
+        client.move_to(500)
+    with pytest.raises(NotStopped, match="its last target, 300 deg"):
+        client.stop()
