@@ -1,16 +1,17 @@
 """What `run` works on: a plan file, checked against the map that it was made on."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from planner.arrays import FloatArray
-from planner.errors import PlannerError
+from planner.errors import ArmTableError, PlannerError, PoseError
 from planner.kinematics.configuration import Configuration
 from planner.map.map_file import MAP_FILE, load_maps
+from planner.planning.arm_check import PlannedArm, arm_fault
 from planner.planning.plan import Plan
 from planner.planning.plan_file import load_plan
 from planner.planning.problem import Problem
@@ -70,9 +71,16 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
         limits = Limits(**{key: float(value) for key, value in document["limits"].items()})
         weights = Weights(float(document["weights"]["k_a"]), float(document["weights"]["k_w"]))
         digest = document["provenance"]["map"].get("digest")
-        joints_deg = np.array(document["joints_deg"], dtype=np.float64)
+        if "arm" not in document:
+            raise RunInputError(
+                f"{plan_file}: does not hold the arm, so its limits cannot be checked: an earlier version wrote it;"
+                f" plan anew with python -m planner plan {name} --out {plan_file.parent}"
+            )
+        planned_arm = PlannedArm.read(document)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunInputError(f"{plan_file}: is damaged: {type(error).__name__}, {error}") from error
+    except (ArmTableError, PoseError) as error:
+        raise RunInputError(f"{plan_file}: is damaged: {error}") from error
     if not map_file.is_file():
         raise RunInputError(
             f"{map_file}: the plan's map is not there; python -m planner map {name} --out {map_file.parent} writes it"
@@ -82,8 +90,9 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
     if configuration not in maps or maps[configuration].metadata.get("digest") != digest:
         raise RunInputError(f"{map_file}: is not the map that {plan_file} was made on; compute map and plan anew")
     problem = Problem(maps[configuration], plan.step_s, limits, weights)
-    run_input = RunInput(name, plan, problem, joints_deg, document)
+    run_input = RunInput(name, plan, problem, planned_arm.joints_deg, document)
     _check(plan_file, run_input)
+    _check_arm(plan_file, run_input, planned_arm)
     return run_input
 
 
@@ -97,6 +106,11 @@ def _check(plan_file: Path, run_input: RunInput) -> None:
     if not all(np.isfinite(array).all() for array in numbers):
         raise RunInputError(f"{plan_file}: is damaged: it holds values that are no numbers")
     paused = {pause.step for pause in plan.pauses}
+    for step, from_deg, to_deg in plan.pauses:
+        if not 0 <= step < locations - 1 or (from_deg, to_deg, 0.0) != (
+            plan.angles_deg[step], plan.angles_deg[step + 1], plan.speeds_deg_s[step + 1]
+        ):  # fmt: skip
+            raise RunInputError(f"{plan_file}: has been edited: the pause in step {step} contradicts the angles")
     for k, acceleration in enumerate(plan.accelerations_deg_s2):
         angle, speed = float(plan.angles_deg[k]), float(plan.speeds_deg_s[k])
         angle_error = plan.angles_deg[k + 1] - next_angle(angle, speed, float(acceleration), plan.step_s)
@@ -110,3 +124,17 @@ def _check(plan_file: Path, run_input: RunInput) -> None:
         raise RunInputError(f"{plan_file}: exceeds its own limits; plan anew")
     if checked.forbidden_steps:
         raise RunInputError(f"{plan_file}: meets a forbidden region in step {checked.forbidden_steps[0]}; plan anew")
+
+
+def _check_arm(plan_file: Path, run_input: RunInput, planned_arm: PlannedArm) -> None:
+    """Refuse a plan that the arm cannot follow, by its own word or by ours, or whose arm is not that of the map."""
+    if run_input.problem.map.metadata.get("arm") != json.loads(json.dumps(asdict(planned_arm.cell.arm))):
+        raise RunInputError(f"{plan_file}: its arm is not the arm that its map was made for; compute map and plan anew")
+    if len(planned_arm.T_WS) != run_input.problem.map.location_count:
+        raise RunInputError(f"{plan_file}: is damaged: it holds {len(planned_arm.T_WS)} poses of the probe")
+    fault = arm_fault(planned_arm, run_input.plan) or run_input.document.get("arm_fault")
+    if fault is not None:
+        raise RunInputError(
+            f"{plan_file}: the arm cannot follow the plan: {fault}; plan anew, with a path that turns the probe less or"
+            " takes more time"
+        )

@@ -7,6 +7,7 @@ Memory grows with the maps alone.
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import NamedTuple
 
 import numpy as np
@@ -84,7 +85,12 @@ def build_maps(
             _rate_columns(*cells, first, *window, *_NO_POSES)
         if progress is not None:
             progress(last, n_locations)
-    metadata = {"scan": problem.name, "digest": _digest(cells, user_names), "reasons": texts}
+    metadata = {
+        "scan": problem.name,
+        "digest": _digest(cells, user_names),
+        "arm": asdict(problem.cell.arm),
+        "reasons": texts,
+    }
     return {
         configuration: ConfigurationMap(
             values[c], reasons[c], metadata=metadata | {"configuration": configuration.label}

@@ -1,6 +1,7 @@
 """A plan on disk: one JSON file with everything needed to run it. The same plan gives the same bytes."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -
     """Return a plan with its scan, its limits and where it comes from, as JSON can hold it.
 
     Angles are degrees, lengths mm, times s; `locations` holds the probe's poses in the workpiece frame, row by row.
+    `arm_fault` says why the arm cannot follow; such a plan is there to be looked at.
     """
     checked = verify(problem, plan)
     cell = scan.cell
@@ -46,6 +48,8 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -
             "pauses": [pause._asdict() for pause in plan.pauses],
         },
         "joints_deg": _rounded(np.degrees(joints.joints)),
+        "arm": asdict(cell.arm),
+        "arm_fault": None if joints.step is None else f"{joints.reason.name} at location {joints.step}",
         "locations": _rounded(scan.path.T_WS),
         "cell": {"T_BT": _rounded(cell.T_BT), "T_TW": _rounded(cell.T_TW), "T_FS": _rounded(cell.T_FS)},
         "limits": problem.limits._asdict(),
@@ -59,7 +63,7 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -
         "provenance": {
             "scan": scan.name,
             "software_version": software_version(),
-            "map": _plain({k: v for k, v in problem.map.metadata.items() if k != "reasons"}),
+            "map": _plain({k: v for k, v in problem.map.metadata.items() if k not in {"arm", "reasons"}}),
             "map_angles": problem.map.angle_count,
             "map_epsilon": problem.map.epsilon,
         },

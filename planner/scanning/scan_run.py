@@ -23,6 +23,7 @@ from planner.geometry.ray_casting import RayCaster
 from planner.kinematics.configuration import Configuration
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
+from planner.planning.arm_check import PlannedArm, arm_fault
 from planner.planning.arm_motion import arm_motion
 from planner.planning.best_configuration import best_configuration
 from planner.planning.plan import Plan
@@ -140,9 +141,14 @@ def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: Progre
     plan = comparison.outcomes[comparison.best]
     assert isinstance(plan, Plan)
     joints = arm_motion(scan, Configuration.parse(comparison.best), plan)
-    if joints.step is not None:
-        raise ScanError(f"{scan.name}: the arm cannot follow the plan at location {joints.step}; scan it more slowly")
-    return Planned(plan, np.degrees(joints.joints), limits)
+    joints_deg = np.degrees(joints.joints)
+    fault = arm_fault(PlannedArm(scan.cell, scan.path.T_WS, joints_deg), plan)
+    if fault is not None or joints.step is not None:
+        raise ScanError(
+            f"{scan.name}: the arm cannot follow the plan: {fault or f'at location {joints.step}'}; change the path so"
+            " that it turns the probe less or takes more time"
+        )
+    return Planned(plan, joints_deg, limits)
 
 
 def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) -> LatchedRun:

@@ -1,12 +1,16 @@
 """A short scan to run: plan and map on disk, as the planner's commands write them."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from planner.arrays import FloatArray
+from planner.cell.cell import Cell
 from planner.execution.run_input import RunInput
+from planner.geometry.transforms import rigid_inverse
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
 from planner.map.map_file import save_maps
@@ -18,13 +22,21 @@ from planner.table.motion import roll_out
 
 CONFIGURATION = Configuration.parse("LEFTY-ABOVE-NOFLIP")
 LOCATIONS = 16
+CELL = Cell()
+JOINTS_DEG = np.array([[4.0 * k, -60.0, 150.0, 0.0, 45.0, 0.0] for k in range(LOCATIONS)])
+
+
+def scan_locations(angles_deg: FloatArray, joints_deg: FloatArray) -> FloatArray:
+    """Return the poses of the probe on the workpiece that joints reach at table angles."""
+    probe = CELL.arm.flange_poses(np.radians(joints_deg)) @ CELL.T_FS
+    return rigid_inverse(CELL.table_factors(angles_deg) @ CELL.T_TW) @ probe
 
 
 def short_problem() -> Problem:
     """Return a problem whose table has to leave its place: a forbidden block comes towards it."""
     blocks = [(0, LOCATIONS - 1, 200, 240), (6, LOCATIONS - 1, 340, 359), (6, LOCATIONS - 1, 0, 4)]
     plain = blocks_map(LOCATIONS, 360, blocks, edge=6)
-    about = {"configuration": CONFIGURATION.label, "digest": "short", "scan": "short"}
+    about = {"configuration": CONFIGURATION.label, "digest": "short", "scan": "short", "arm": asdict(CELL.arm)}
     reasons = (plain.values == 0.0).astype(np.uint8)
     return Problem(ConfigurationMap(plain.values, reasons, metadata=about), 0.1, start_angle_deg=0.0)
 
@@ -61,7 +73,11 @@ def document_of(run_input: RunInput) -> dict[str, Any]:
             "accelerations_deg_s2": plan.accelerations_deg_s2.tolist(),
             "pauses": [pause._asdict() for pause in plan.pauses],
         },
-        "joints_deg": [[10.0 * k, 0.0, 90.0, 0.0, 45.0, 0.0] for k in range(LOCATIONS)],
+        "joints_deg": JOINTS_DEG.tolist(),
+        "arm": asdict(CELL.arm),
+        "arm_fault": None,
+        "locations": scan_locations(plan.angles_deg, JOINTS_DEG).tolist(),
+        "cell": {"T_BT": CELL.T_BT.tolist(), "T_TW": CELL.T_TW.tolist(), "T_FS": CELL.T_FS.tolist()},
         "limits": problem.limits._asdict(),
         "weights": {"k_a": problem.terms.acceleration_weight, "k_w": problem.terms.speed_weight},
         "cost": plan.cost._asdict() | {"total": plan.cost.total},

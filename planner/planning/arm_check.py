@@ -1,0 +1,70 @@
+"""Check the arm's side of a plan: does the arm hold the probe where the scan wants it, and within its limits?"""
+
+from dataclasses import fields
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planner.arrays import FloatArray
+from planner.cell.cell import Cell
+from planner.kinematics.arm import Arm
+from planner.kinematics.configuration import Configuration, configurations
+from planner.kinematics.joint_limits import first_joint_fault
+from planner.planning.plan import Plan
+
+# Joints in a file carry nine decimals, which is some nanometers at the probe; a joint that is 0.001 deg off is seen.
+_POSITION_TOLERANCE_MM = 1e-3
+_AXIS_TOLERANCE = 1e-5
+
+
+class PlannedArm(NamedTuple):
+    """The arm's side of a plan.
+
+    Attributes:
+        cell: the arm and its placements.
+        T_WS: (n + 1, 4, 4) the scan locations.
+        joints_deg: (n + 1, 6) the joints at the scan locations, on the turns that they are to have.
+    """
+
+    cell: Cell
+    T_WS: FloatArray
+    joints_deg: FloatArray
+
+    @classmethod
+    def read(cls, document: dict[str, Any]) -> "PlannedArm":
+        """Return what a plan's document says of the arm; numbers that are missing become NaN.
+
+        Raises:
+            PlannerError: the arm's table or a placement is not one.
+            KeyError, TypeError, ValueError: an entry is missing, or of another type.
+        """
+        stored = document["arm"]
+        columns = (tuple(map(float, stored[column.name])) for column in fields(Arm)[1:])
+        T_BT, T_TW, T_FS = (
+            np.array(document["cell"][name], dtype=np.float64).reshape(4, 4) for name in ("T_BT", "T_TW", "T_FS")
+        )
+        T_WS = np.array(document["locations"], dtype=np.float64).reshape(-1, 4, 4)
+        joints_deg = np.array(document["joints_deg"], dtype=np.float64)
+        return cls(Cell(Arm(str(stored["name"]), *columns), T_BT, T_TW, T_FS), T_WS, joints_deg)
+
+
+def arm_fault(planned: PlannedArm, plan: Plan) -> str | None:
+    """Return why the arm cannot follow a plan, in a clause; None where it can."""
+    cell, T_WS, joints_deg = planned
+    fault = first_joint_fault(cell.arm, joints_deg, plan.step_s, [pause.step for pause in plan.pauses])
+    if fault is not None:
+        return str(fault)
+    joints = np.radians(joints_deg)
+    goals = cell.table_factors(plan.angles_deg) @ cell.location_factors(T_WS)
+    off = np.abs(cell.arm.flange_poses(joints) - goals)
+    far = np.flatnonzero(
+        (off[:, :3, 3] > _POSITION_TOLERANCE_MM).any(axis=1) | (off[:, :3, :3] > _AXIS_TOLERANCE).any(axis=(1, 2))
+    )
+    if len(far):
+        location = int(far[0])
+        return f"at location {location} its joints put the probe {np.linalg.norm(off[location, :3, 3]):.3f} mm away"
+    asked = Configuration.parse(plan.configuration)
+    others = np.flatnonzero(configurations(cell.arm, joints) != asked)
+    if len(others):
+        return f"at location {int(others[0])} its joints are not {asked.label}, the configuration of the plan"
+    return None

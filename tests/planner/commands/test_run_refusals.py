@@ -1,0 +1,142 @@
+"""What `run` refuses before anything moves, through the command line, on a stand-in that is asked where it is."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planner.__main__ import main
+from planner.execution.inside_view import ControlView, Look
+from planner.kinematics.configuration import Configuration
+from planner.kinematics.inverse_kinematics import inverse_kinematics
+from tests.planner.run_examples import CELL, JOINTS_DEG, LOCATIONS, scan_locations, write_short_scan
+
+Document = dict[str, Any]
+Change = Callable[[Document], object]
+
+
+@pytest.fixture(scope="module")
+def stand_in(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
+    """Yield the port and the control channel of a running stand-in."""
+    control = tmp_path_factory.mktemp("stand-in") / "control"
+    command = [sys.executable, "-m", "emulator", "--tcp", "0", "--control", str(control)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        assert process.stdout is not None
+        try:
+            yield process.stdout.readline().strip(), control
+        finally:
+            process.terminate()
+
+
+def state_of(control: Path) -> Look:
+    """Return where the table is, by its own state."""
+    view = ControlView(control)
+    try:
+        return view.look()
+    finally:
+        view.close()
+
+
+def with_joints(joints_deg: np.ndarray[Any, np.dtype[np.float64]]) -> Change:
+    """Return the change that gives a plan other joints, and the probe's poses that belong to them."""
+
+    def change(document: Document) -> None:
+        angles_deg = np.array(document["table"]["angles_deg"])
+        document["joints_deg"] = joints_deg.tolist()
+        document["locations"] = scan_locations(angles_deg, joints_deg).tolist()
+
+    return change
+
+
+def moved(joint: int, by_deg: float, first: int = 0, last: int = LOCATIONS) -> Change:
+    """Return the change that moves one joint, counted from 1, at some locations."""
+    joints_deg = JOINTS_DEG.copy()
+    joints_deg[first:last, joint - 1] += by_deg
+    return with_joints(joints_deg)
+
+
+def flip_the_wrist(document: Document) -> None:
+    """Hold the same poses in another configuration than the plan's."""
+    joints, _ = inverse_kinematics(CELL.arm, CELL.arm.flange_poses(np.radians(JOINTS_DEG)))
+    document["joints_deg"] = np.degrees(np.unwrap(joints[:, Configuration.LEFTY_ABOVE_FLIP], axis=0)).tolist()
+
+
+def call_a_step_a_pause(document: Document) -> None:
+    moved(6, 300.0, first=8)(document)
+    document["table"]["pauses"] = [{"step": 7, "from_angle_deg": 0.0, "to_angle_deg": 0.0}]
+
+
+REFUSED: dict[str, tuple[Change, str]] = {
+    "joint 6 a turn too far": (moved(6, 720.0), "at location 0 joint 6 is at 720.0 deg, beyond its limit of 360 deg"),
+    "joint 4 a turn too far": (
+        moved(4, -360.0),
+        "at location 0 joint 4 is at -360.0 deg, beyond its limit of -190 deg",
+    ),
+    "joint 2 beyond its limit": (
+        moved(2, 110.0, 5),
+        "at location 5 joint 2 is at 50.0 deg, beyond its limit of 45 deg",
+    ),
+    "joint 1 beyond its limit": (
+        with_joints(JOINTS_DEG + np.array([120.0, 0.0, 0.0, 0.0, 0.0, 0.0])),
+        "at location 13 joint 1 is at 172.0 deg, beyond its limit of 170 deg",
+    ),
+    "joint 6 in a step": (moved(6, 61.0, 4), "at location 4 joint 6 moves at 610.0 deg/s from the location before"),
+    "joint 1 back in a step": (moved(1, -37.0, 7), "at location 7 joint 1 moves at -330.0 deg/s from the location"),
+    "a turn that is not carried along": (moved(6, 360.0, 9), "at location 9 joint 6 moves by 360.0 deg from the"),
+    "joints that are lies": (
+        lambda plan: plan["joints_deg"][3].__setitem__(0, 12.01),
+        "at location 3 its joints put the probe 0.0",
+    ),
+    "a turned probe": (lambda plan: plan["joints_deg"][3].__setitem__(5, 0.01), "at location 3 its joints put the"),
+    "a table elsewhere": (lambda plan: plan["cell"]["T_BT"][0].__setitem__(3, 600.0), "at location 0 its joints put"),
+    "another configuration": (flip_the_wrist, "at location 0 its joints are not LEFTY-ABOVE-NOFLIP"),
+    "no joints at a location": (lambda plan: plan["joints_deg"].__setitem__(2, [None] * 6), "joint 1 has no angle"),
+    "the planner's own word": (
+        lambda plan: plan.update(arm_fault="OUT_OF_REACH at location 5"),
+        "the arm cannot follow the plan: OUT_OF_REACH at location 5",
+    ),
+    "limits that were lifted": (
+        lambda plan: (moved(6, 720.0)(plan), plan["arm"]["upper_deg"].__setitem__(5, 3600.0)),
+        "its arm is not the arm that its map was made for",
+    ),
+    "a pause that hides a jump": (call_a_step_a_pause, "has been edited: the pause in step 7 contradicts the angles"),
+    "an earlier version's plan": (lambda plan: plan.pop("arm"), "plan anew with python -m planner plan short --out"),
+    "an arm that is none": (lambda plan: plan["arm"]["d_mm"].pop(), "must hold 6 finite numbers"),
+    "no poses": (lambda plan: plan.pop("locations"), "is damaged: KeyError, 'locations'"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_an_arm_that_cannot_follow_is_refused_in_one_line_and_nothing_moves(
+    case: str, stand_in: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change, sentence = REFUSED[case]
+    plan_file = write_short_scan(tmp_path)
+    document = json.loads(plan_file.read_text(encoding="utf-8"))
+    change(document)
+    plan_file.write_text(json.dumps(document), encoding="utf-8")
+    port, control = stand_in
+    before = state_of(control)
+    arguments = ["--port", port, "--control", str(control), "--out", str(tmp_path / "run")]
+    assert main(["run", str(plan_file), *arguments]) == 2
+    shown = capsys.readouterr()
+    assert sentence in shown.err
+    assert shown.err.startswith(str(plan_file))
+    assert shown.err.count("\n") == 1
+    assert shown.out == ""
+    assert not (tmp_path / "run").exists()
+    assert state_of(control) == before
+
+
+def test_the_example_that_the_refusals_change_is_a_plan_that_runs(tmp_path: Path) -> None:
+    plan_file = write_short_scan(tmp_path)
+    assert main(["run", str(plan_file), "--port", "emulator://", "--out", str(tmp_path / "run")]) == 0
+    document = json.loads(plan_file.read_text(encoding="utf-8"))
+    moved(6, -359.0)(document)
+    plan_file.write_text(json.dumps(document), encoding="utf-8")
+    assert main(["run", str(plan_file), "--port", "emulator://", "--out", str(tmp_path / "run")]) == 0
