@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from planner.errors import PlannerError
 from planner.execution.inside_view import InsideView
+from planner.execution.run_on import DEFAULT_RUN_ON_DEG
 from planner.execution.run_record import Record, Sent
 from planner.execution.stream import TimedCommand
 from planner.execution.stream_correction import CorrectedStream
@@ -47,6 +48,7 @@ class Settings(NamedTuple):
         drift_filter_s: over how long readings are averaged for that.
         poll_s: from one reading of the position to the next, at least.
         look_s: the same for looks from inside.
+        run_on_deg: how far the table may run on when the line dies.
     """
 
     lag_s: float = 0.0035
@@ -56,6 +58,7 @@ class Settings(NamedTuple):
     drift_filter_s: float = 3.0
     poll_s: float = 0.05
     look_s: float = 0.02
+    run_on_deg: float = DEFAULT_RUN_ON_DEG
 
     @property
     def encoder_delay_s(self) -> float:
@@ -90,7 +93,13 @@ def execute(
     """
     settings = settings or Settings()
     commands = CorrectedStream(
-        motion, limits, wire, settings.drift_deg, settings.drift_filter_s, settings.encoder_delay_s
+        motion,
+        limits,
+        wire,
+        settings.drift_deg,
+        settings.drift_filter_s,
+        settings.encoder_delay_s,
+        settings.run_on_deg,
     )
     # The first command's S and A are to be sent in peace.
     preparation_s = 4.0 * exchanges_s(wire, _ANY_COMMAND)

@@ -1,21 +1,26 @@
 """From a planned motion to timed commands: one `A`, `S`, `P` for each step, no I/O.
 
 The wire carries one decimal. Rounding each value on its own would let the errors add up, so each step starts from where
-the reference is *predicted* to be, exactly, after all commands before it (`velocity_profile`), and takes the S and A
-that bring it nearest to the plan at the step's end (`closest_command`): what one step could not say, the next one takes
-out.
+the reference is *predicted* to be, exactly, after all commands before it (`velocity_profile`), and takes the S, the A
+and the moment that bring it nearest to the plan at the step's end (`closest_command`): what one step could not say, the
+next one takes out. Steps that are too long for one command get several (`pieces`).
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from planner.execution.closest_command import STANDING_DEG_S, closest_command, command_towards
+from planner.execution.closest_command import STANDING_DEG_S, Choice, Step, closest_command, going_on, with_target
+from planner.execution.pieces import pieces_of, spacing_s
+from planner.execution.run_on import DEFAULT_RUN_ON_DEG, latest_s, next_command_within_s
 from planner.execution.table_motion import Leg, TableMotion
 from planner.table.motion import Limits
 from planner.table.velocity_profile import MotionCommand, ReferenceState, advance
 from planner.table.wire import Grid, StreamError, Wire, exchanges_s
+
+# From this share of the greatest acceleration on, a plan leaves nothing to make up for an error of the speed.
+_AT_LIMIT = 0.97
 
 
 class TimedCommand(NamedTuple):
@@ -33,31 +38,116 @@ class TimedCommand(NamedTuple):
     command: MotionCommand
     expected: ReferenceState
 
+    def reference_at(self, time_s: float) -> ReferenceState:
+        """Return where the reference is at a time from then on, until the next command."""
+        return advance(self.expected, self.command, time_s - self.time_s)
+
 
 def stream(
-    motion: TableMotion, limits: Limits, wire: Wire, first: int = 0, start: ReferenceState | None = None
+    motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float = DEFAULT_RUN_ON_DEG
 ) -> tuple[TimedCommand, ...]:
     """Return the commands of a motion, in the order of their times.
+
+    The table stands at the motion's start, as far as the wire can say that.
 
     Args:
         motion: what the table should do.
         limits: greatest S and A.
         wire: how fine the numbers are.
-        first: the first leg to command; those before are done.
-        start: where the reference is at its beginning; None: at rest at the motion's start, as far as the wire can say
-            that.
+        run_on_deg: how far the table may run on when the line dies; where that is not possible, it runs on as little
+            as the limits allow.
 
     Raises:
         StreamError: a limit is below the smallest number that the wire can say.
     """
-    grid = Grid(limits, wire)
-    state = start or ReferenceState(grid.nearest(motion.start_deg), 0.0)
-    commands = []
-    for leg in motion.legs[first:]:
-        command = grid.command(leg.command) if leg.command else closest_command(state, leg, grid)
-        commands.append(TimedCommand(leg.start_s, leg, command, state))
-        state = advance(state, command, leg.duration_s)
-    return tuple(commands)
+    return Streaming(motion, limits, wire, run_on_deg).commands()
+
+
+class Streaming:
+    """The streaming of one motion, whole or from any of its commands on."""
+
+    def __init__(self, motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float) -> None:
+        """Part the motion into the pieces that get a command each; see `stream`."""
+        self._motion, self._run_on_deg = motion, run_on_deg
+        self._grid = Grid(limits, wire)
+        self._most_rate = _AT_LIMIT * limits.acceleration_deg_s2
+        self._pieces = pieces_of(motion, limits, wire, run_on_deg)
+        self._spacing_s = spacing_s(motion, limits, wire)
+
+    def commands(self) -> tuple[TimedCommand, ...]:
+        """Return all commands."""
+        start = ReferenceState(self._grid.nearest(self._motion.start_deg), 0.0)
+        return tuple(self._chain(None, start, self._pieces))
+
+    def commands_after(self, running: TimedCommand, sent: int, next_s: float) -> Iterator[TimedCommand]:
+        """Yield the commands that follow the first `sent` ones, from where those brought the reference.
+
+        Args:
+            running: the last command that was sent, as it took effect.
+            sent: how many commands were sent.
+            next_s: when the next command takes effect; the running one has been given a target for that.
+        """
+        return self._chain(running, running.expected, self._pieces[sent:], max(next_s, running.time_s))
+
+    def _chain(
+        self, running: TimedCommand | None, start: ReferenceState, pieces: Sequence[Leg], first_s: float | None = None
+    ) -> Iterator[TimedCommand]:
+        """Yield a command for each piece, when the moment of the next is known: its target depends on that."""
+        pending: TimedCommand | None = None
+        for piece in pieces:
+            before = _standing_at(start) if running is None else running.reference_at
+            choice = self._choice(running, before, piece, first_s)
+            if pending is not None:
+                yield self._aimed(pending, choice.time_s)
+            running = pending = TimedCommand(choice.time_s, piece, choice.command, before(choice.time_s))
+            first_s = None
+        if pending is not None:
+            yield pending
+
+    def _choice(
+        self,
+        running: TimedCommand | None,
+        before: Callable[[float], ReferenceState],
+        piece: Leg,
+        first_s: float | None,
+    ) -> Choice:
+        """Return the command of a piece: its own, or the closest one."""
+        if piece.command is not None:
+            return Choice(piece.start_s if first_s is None else first_s, self._grid.command(piece.command))
+        begin_s = piece.start_s if running is None else max(piece.start_s, running.time_s)
+        # A command that came very late has left little of the step; what is left of its error is taken out later.
+        end_s = max(piece.end_s, begin_s + 0.5 * piece.duration_s)
+        if first_s is None:
+            # The command of the next piece may come at once, and needs its time on the line.
+            latest_s = end_s - min(piece.duration_s, self._spacing_s)
+            if running is not None:
+                # A step after the last command it may always come.
+                within_s = max(self._within_s(running), running.leg.duration_s)
+                latest_s = min(latest_s, running.time_s + within_s)
+            earliest_s, latest_s = begin_s, max(begin_s, latest_s)
+        else:
+            earliest_s = latest_s = first_s
+        middle, end = (self._motion.state_at(time_s) for time_s in (0.5 * (begin_s + end_s), end_s))
+        stands = max(abs(piece.start.speed_deg_s), abs(end.speed_deg_s)) <= STANDING_DEG_S
+        planned = max(abs(leg.acceleration_deg_s2) for leg in (piece, self._motion.leg_at(end_s)))
+        step = Step(begin_s, end_s, earliest_s, latest_s, middle, end, stands, planned > self._most_rate)
+        return closest_command(before, step, self._grid, self._run_on_deg)
+
+    def _within_s(self, running: TimedCommand) -> float:
+        """Return how soon after a command the next one has to come, for the run-on of the first to stay short."""
+        _, speed, rate = running.command
+        fastest = max(speed, abs(running.expected.speed_deg_s))
+        return next_command_within_s(fastest, rate, running.leg.duration_s, self._run_on_deg)
+
+    def _aimed(self, timed: TimedCommand, next_s: float) -> TimedCommand:
+        """Return a command with a target that serves until the next one."""
+        late_s = latest_s(timed.leg.duration_s)
+        choice = Choice(timed.time_s, timed.command)
+        return timed._replace(command=with_target(choice, timed.expected, next_s, late_s, self._grid))
+
+
+def _standing_at(state: ReferenceState) -> Callable[[float], ReferenceState]:
+    return lambda _: state
 
 
 def rounded_stream(motion: TableMotion, limits: Limits, wire: Wire) -> tuple[TimedCommand, ...]:
@@ -72,7 +162,8 @@ def rounded_stream(motion: TableMotion, limits: Limits, wire: Wire) -> tuple[Tim
             end_speed = leg.state_at(leg.end_s).speed_deg_s
             heading = end_speed if abs(end_speed) > STANDING_DEG_S else leg.acceleration_deg_s2
             speed = math.copysign(grid.speed(abs(end_speed)), heading)
-            command = command_towards(state, speed, grid.rate(abs(leg.acceleration_deg_s2)), leg.duration_s, grid)
+            choice = Choice(leg.start_s, going_on(speed, grid.rate(abs(leg.acceleration_deg_s2))))
+            command = with_target(choice, state, leg.end_s, latest_s(leg.duration_s), grid)
         commands.append(TimedCommand(leg.start_s, leg, command, state))
         state = advance(state, command, leg.duration_s)
     return tuple(commands)
@@ -103,4 +194,4 @@ def reference_states(commands: Iterable[TimedCommand], times_s: Iterable[float])
     for time_s in times_s:
         while after is not None and after.time_s <= time_s:
             current, after = after, next(following, None)
-        yield advance(current.expected, current.command, max(0.0, time_s - current.time_s))
+        yield current.reference_at(max(time_s, current.time_s))

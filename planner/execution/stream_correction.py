@@ -6,12 +6,15 @@ rules, from each command as it was sent, and moved by what the readings of the e
 where the next command expects it, the rest of the motion is streamed anew from where it is.
 """
 
-from planner.execution.closest_command import latest_s
+from collections.abc import Iterator
+from itertools import islice
+
+from planner.execution.run_on import latest_s
 from planner.execution.run_record import Correction
-from planner.execution.stream import TimedCommand, check_it_fits, stream
+from planner.execution.stream import Streaming, TimedCommand, check_it_fits
 from planner.execution.table_motion import TableMotion
 from planner.table.motion import Limits
-from planner.table.velocity_profile import ReferenceState, advance
+from planner.table.velocity_profile import ReferenceState
 from planner.table.wire import Wire
 
 # A reference farther than this from where the stream had it is worth a new stream.
@@ -34,6 +37,7 @@ class CorrectedStream:
         drift_deg: float,
         drift_filter_s: float,
         encoder_delay_s: float,
+        run_on_deg: float,
     ) -> None:
         """Compute the stream.
 
@@ -44,22 +48,26 @@ class CorrectedStream:
             drift_deg: how far readings may be from where they were expected before the reference is moved.
             drift_filter_s: over how long readings are averaged for that.
             encoder_delay_s: how long after the reference's time in the stream the encoder is at the same angle.
+            run_on_deg: how far the table may run on when the line dies.
 
         Raises:
             StreamError: the commands follow one another faster than the wire carries them.
         """
         self.corrections: list[Correction] = []
         self.running: TimedCommand | None = None
-        self._motion, self._limits, self._wire = motion, limits, wire
         self._drift_deg, self._encoder_delay_s = drift_deg, encoder_delay_s
         self._drift = _Drift(drift_filter_s)
-        self._commands = stream(motion, limits, wire)
+        self._streaming = Streaming(motion, limits, wire, run_on_deg)
+        self._commands = list(self._streaming.commands())
+        self._rest: Iterator[TimedCommand] = iter(())  # computed as they come due: a new stream takes time
         self._sent = 0
         check_it_fits(self._commands, wire)
 
     @property
     def following(self) -> TimedCommand | None:
         """The next command as it stands, not yet corrected; None when all are sent."""
+        if self._sent == len(self._commands):
+            self._commands.extend(islice(self._rest, 1))
         return self._commands[self._sent] if self._sent < len(self._commands) else None
 
     def next(self) -> TimedCommand | None:
@@ -74,7 +82,7 @@ class CorrectedStream:
     def sent(self, timed: TimedCommand, late_s: float) -> None:
         """Take note that the next command was sent, and how late."""
         time_s = timed.time_s + max(0.0, late_s)
-        there = timed.expected if self.running is None else _reference_at(self.running, time_s)
+        there = timed.expected if self.running is None else self.running.reference_at(time_s)
         self.running = timed._replace(time_s=time_s, expected=there)
         self._sent += 1
 
@@ -82,7 +90,7 @@ class CorrectedStream:
         """Take note of where the encoder was at a time that is known for certain."""
         running = self.running
         if running is not None and (reference_s := time_s - self._encoder_delay_s) >= running.time_s:
-            self._drift.take(time_s, angle_deg - _reference_at(running, reference_s).angle_deg)
+            self._drift.take(time_s, angle_deg - running.reference_at(reference_s).angle_deg)
 
     def _correct(self) -> None:
         running, timed = self.running, self.following
@@ -93,16 +101,12 @@ class CorrectedStream:
             moved = ReferenceState(angle_deg + self._drift.estimate_deg, speed_deg_s)
             self.running = running = running._replace(expected=moved)
             self._drift.forget()
-        start = _reference_at(running, timed.time_s)
+        start = running.reference_at(timed.time_s)
         slip_deg = start.angle_deg - timed.expected.angle_deg
         if abs(slip_deg) > _SLIP_DEG:
             self.corrections.append(Correction(timed.time_s, slip_deg))
-            anew = stream(self._motion, self._limits, self._wire, self._sent, start)
-            self._commands = (*self._commands[: self._sent], *anew)
-
-
-def _reference_at(running: TimedCommand, time_s: float) -> ReferenceState:
-    return advance(running.expected, running.command, time_s - running.time_s)
+            self._rest = self._streaming.commands_after(running, self._sent, timed.time_s)
+            del self._commands[self._sent :]
 
 
 class _Drift:

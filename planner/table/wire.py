@@ -96,6 +96,13 @@ class Grid:
         below = math.floor(min(value / self.quantum, self._most_rate))
         return self.rate(below * self.quantum), self.rate((below + 1) * self.quantum)
 
+    def rate_at_least(self, value: float) -> float:
+        """Return the smallest allowed A that is not below a rate; the greatest one where none is."""
+        steps = value / self.quantum
+        return self._number(
+            min(max(math.ceil(steps - 1e-6), 1), self._most_rate) if steps < self._most_rate else self._most_rate
+        )
+
     def speeds_around(self, speed_deg_s: float, count: int) -> list[float]:
         """Return the allowed speeds, signed and without 0, within `count` numbers of one."""
         middle = round(speed_deg_s / self.quantum)

@@ -42,7 +42,7 @@ def run(
 
 
 def stands(port: FaultyPort) -> bool:
-    port.table.advance(4000)
+    port.table.advance(8000)
     return bool(port.table.status().state in {"idle", "stalled"})
 
 

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.arrays import FloatArray
+from planner.execution.run_on import latest_s
 from planner.execution.stream import TimedCommand, check_it_fits, reference_states, rounded_stream, stream
 from planner.execution.table_motion import TableMotion
 from planner.planning.plan import Plan
@@ -16,7 +17,7 @@ from planner.table.motion import Limits, roll_out
 from planner.table.velocity_profile import advance
 from planner.table.wire import StreamError, Wire
 from tests.planner.run_examples import paused_run_input
-from tools.bench.stream import random_plan
+from tools.bench.stream import random_plan, stream_figures
 
 LIMITS = Limits()
 
@@ -39,11 +40,11 @@ def errors_of(motion: TableMotion, commands: tuple[TimedCommand, ...], times_s: 
     # Limits that the wire can say: a plan at a speed of 1.75 cannot be followed with one decimal.
     limits=st.builds(Limits, st.integers(5, 400).map(lambda n: n / 10), st.integers(10, 1000).map(lambda n: n / 10)),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 def test_the_reference_stays_with_any_plan_within_limits(
     seed: int, step_s: float, decimals: int, limits: Limits
 ) -> None:
-    plan = random_plan(np.random.default_rng(seed), step_s, 30 * step_s, limits)
+    plan = random_plan(np.random.default_rng(seed), step_s, 20 * step_s, limits)
     motion = TableMotion(plan, limits)
     commands = stream(motion, limits, Wire(decimals))
     for timed in commands:
@@ -53,7 +54,36 @@ def test_the_reference_stays_with_any_plan_within_limits(
     unit = 10.0**-decimals
     bound = 0.5 * unit + 0.1 * unit * step_s + 1e-6
     assert errors_of(motion, commands, motion.column_times_s).max() <= bound
-    assert errors_of(motion, commands, np.linspace(0.0, motion.end_s, 400)).max() <= bound + 0.5 * unit
+    assert errors_of(motion, commands, np.linspace(0.0, motion.end_s, 400)).max() <= max(bound + 0.5 * unit, 0.15)
+
+
+@given(
+    seed=st.integers(0, 10_000),
+    step_s=st.sampled_from([0.05, 0.1, 0.35, 0.55, 1.0, 2.0, 5.0]),
+    decimals=st.integers(1, 3),
+    limits=st.sampled_from([LIMITS, Limits(40.0, 20.0), Limits(10.0, 5.0), Limits(120.0, 300.0)]),
+    run_on_deg=st.sampled_from([30.0, 90.0, 200.0]),
+)
+@settings(max_examples=20, deadline=None)
+def test_no_command_lets_the_table_run_on_farther_than_chosen_or_needed(
+    seed: int, step_s: float, decimals: int, limits: Limits, run_on_deg: float
+) -> None:
+    plan = random_plan(np.random.default_rng(seed), step_s, 15 * step_s, limits)
+    motion = TableMotion(plan, limits)
+    commands = stream(motion, limits, Wire(decimals, 115_200), run_on_deg)
+    speed = float(np.abs(plan.speeds_deg_s).max())
+    needed_deg = 0.5 * speed**2 / limits.acceleration_deg_s2 + speed * (step_s + latest_s(step_s))
+    figures = stream_figures(motion, commands)
+    assert figures.run_on_deg <= max(run_on_deg, needed_deg) + 0.2
+    if run_on_deg == 90.0:
+        assert figures.between_deg <= 0.15
+
+
+def test_commands_follow_one_another_no_faster_than_the_line_carries_them() -> None:
+    wire = Wire()
+    for step_s in (0.06, 0.08, 0.1, 0.3, 1.0):
+        motion = TableMotion(random_plan(np.random.default_rng(4), step_s, 40 * step_s, LIMITS), LIMITS)
+        check_it_fits(stream(motion, LIMITS, wire, 30.0), wire)
 
 
 def test_errors_are_taken_out_and_do_not_add_up() -> None:

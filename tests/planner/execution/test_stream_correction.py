@@ -15,7 +15,9 @@ DELAY_S = 0.0035
 
 
 def corrected(drift_deg: float = 0.15, motion: TableMotion = MOTION) -> CorrectedStream:
-    return CorrectedStream(motion, LIMITS, WIRE, drift_deg, drift_filter_s=1.0, encoder_delay_s=DELAY_S)
+    return CorrectedStream(
+        motion, LIMITS, WIRE, drift_deg, drift_filter_s=1.0, encoder_delay_s=DELAY_S, run_on_deg=90.0
+    )
 
 
 def run(commands: CorrectedStream, late_s: dict[int, float], ahead_deg: float = 0.0) -> list[TimedCommand]:
@@ -49,6 +51,14 @@ def test_what_a_late_command_costs_is_taken_out_by_the_next_ones() -> None:
     ]
     assert abs(off_deg[6]) > 0.03
     assert max(map(abs, off_deg[8:])) < 0.02
+
+
+def test_what_is_streamed_anew_keeps_the_run_on_short() -> None:
+    commands = corrected()
+    effects = run(commands, {3: 0.05, 9: 0.05})
+    assert len(commands.corrections) >= 2
+    for effect in effects:
+        assert abs(effect.command.target_deg - effect.expected.angle_deg) <= 90.0
 
 
 def test_a_table_that_drifts_is_streamed_anew_from_where_it_is() -> None:
@@ -89,4 +99,4 @@ def test_a_command_may_be_late_by_a_share_of_the_step_before() -> None:
 
 def test_commands_that_do_not_fit_the_line_are_refused() -> None:
     with pytest.raises(StreamError, match="would fit"):
-        CorrectedStream(MOTION, LIMITS, Wire(baud=1200), 0.15, 3.0, 0.0)
+        CorrectedStream(MOTION, LIMITS, Wire(baud=1200), 0.15, 3.0, 0.0, 90.0)
