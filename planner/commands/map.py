@@ -16,6 +16,9 @@ from planner.map.map_file import MAP_FILE, save_maps
 from planner.map.map_plots import plot_map, plot_map_cylinder
 from planner.map.map_problem import map_problem
 from planner.progress import progress_line
+from planner.set_aside import set_aside
+
+MAP_RESULTS = (MAP_FILE, "map.png", "map_cylinder.png")
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -34,6 +37,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write `map.npz`, `map.png` and `map_cylinder.png`, print what can be reached, and return the exit status."""
+    set_aside(arguments.out, MAP_RESULTS)
     configurations = (
         list(Configuration) if arguments.configuration == "all" else [Configuration.parse(arguments.configuration)]
     )

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from planner.cell.scan import shipped_scans
+from planner.execution.run_on import DEFAULT_RUN_ON_DEG
 
 
 def add_scan(parser: argparse.ArgumentParser) -> None:
@@ -38,6 +39,17 @@ def add_wire(parser: argparse.ArgumentParser) -> None:
         default=1,
         metavar="N",
         help="places after the point on the wire (default 1)",
+    )
+
+
+def add_run_on(parser: argparse.ArgumentParser) -> None:
+    """Add how far the table may run on when the line dies."""
+    parser.add_argument(
+        "--run-on",
+        type=positive_number,
+        default=DEFAULT_RUN_ON_DEG,
+        metavar="DEG",
+        help="maximum angle that the table runs on if the line dies, where the limits allow it (default %(default)g)",
     )
 
 

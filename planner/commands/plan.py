@@ -11,6 +11,7 @@ from pathlib import Path
 from planner.cell.scan import Scan, load_scan
 from planner.commands import options
 from planner.errors import PlannerError
+from planner.execution.run_file import PLAN_FILE, RUN_RESULTS
 from planner.kinematics.configuration import Configuration
 from planner.kinematics.joint_path import JointPath
 from planner.map.config_map import ConfigurationMap
@@ -28,8 +29,11 @@ from planner.planning.smoothing import smooth
 from planner.planning.verification import verify
 from planner.progress import progress_line
 from planner.reasons import Reason
+from planner.set_aside import set_aside
 
 _NO_PLAN = 1
+# A run belongs to its plan: beside another plan it would pass for a run of that.
+PLAN_RESULTS = (PLAN_FILE, "plan.png", MAP_FILE, *RUN_RESULTS)
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -66,6 +70,7 @@ def _angle(text: str) -> float:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write `plan.json`, `map.npz` and `plan.png`, print cost, time and margins, and return the exit status."""
+    set_aside(arguments.out, PLAN_RESULTS)
     best = arguments.configuration == "best"
     asked = list(Configuration) if best else [Configuration.parse(arguments.configuration)]
     scan = load_scan(arguments.scan)
@@ -172,7 +177,7 @@ def comparison_table(problem: Problem, outcomes: Mapping[str, Outcome]) -> str:
 def _write(out: Path, scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
-        save_plan(out / "plan.json", plan_document(scan, problem, plan, joints))
+        save_plan(out / PLAN_FILE, plan_document(scan, problem, plan, joints))
         save_maps(out / MAP_FILE, {Configuration.parse(plan.configuration): problem.map})
         plot_plan(problem, plan, f"{scan.name}   {plan.configuration}   {plan.planner}", out / "plan.png")
     except OSError as error:

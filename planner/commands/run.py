@@ -50,6 +50,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--tolerance", type=options.positive_number, default=DEFAULT_TOLERANCE_DEG, metavar="DEG",
         help="what the encoder may deviate at a location (default %(default)s)",
     )  # fmt: skip
+    options.add_run_on(parser)
     parser.add_argument(
         "--arm-away",
         action="store_true",
@@ -67,6 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
         decimals=arguments.decimals,
         timeout_s=arguments.timeout,
         lead_s=arguments.lead,
+        run_on_deg=arguments.run_on,
         tolerance_deg=arguments.tolerance,
         control=arguments.control,
         arm_is_away=arguments.arm_away,
@@ -100,5 +102,6 @@ def summary(checked: RunVerification) -> str:
         f"cost       planned {checked.planned_cost.total:.4f}"
         + (f", executed {checked.executed_cost.total:.4f}" if checked.executed_cost else ""),
         f"commands   the latest was {1000.0 * checked.latest_command_s:.1f} ms late",
+        f"dead line  {checked.dead_line}",
     ]
     return "\n".join(lines) + "\n"

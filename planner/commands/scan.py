@@ -12,10 +12,12 @@ from planner.scanning.latched_run import TriggerConditions
 from planner.scanning.scan_file import save_scan, scan_document
 from planner.scanning.scan_report import scan_report, verdict_of
 from planner.scanning.scan_run import Scanned, ScanOptions, scan_workpiece
+from planner.set_aside import set_aside
 from planner.whole_file import write_whole
 from protocol import TableError
 
 _INCOMPLETE = 1
+SCAN_RESULTS = ("cloud.ply", "cloud.xyz", "scan.json", "report.html")
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -39,6 +41,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--rate", type=options.positive_number, default=TriggerConditions().rate_hz, metavar="HZ",
         help="profiles a second (default %(default)g)",
     )  # fmt: skip
+    options.add_run_on(parser)
     options.add_map(parser, configuration="best")
     parser.add_argument(
         "--exact-calibration", action="store_true", help="align with the true placements instead of calibrated ones"
@@ -55,6 +58,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def run(arguments: argparse.Namespace) -> int:
     """Scan, write cloud, figures and report, print what it came to, and return the exit status."""
+    set_aside(arguments.out, SCAN_RESULTS, keep=() if arguments.mesh is None else (arguments.mesh,))
     scan = load_scan(arguments.scan)
     if arguments.mesh is not None:
         scan = with_mesh(scan, arguments.mesh)
@@ -64,6 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
         decimals=arguments.decimals,
         control=arguments.control,
         time_scale=arguments.time_scale,
+        run_on_deg=arguments.run_on,
         configuration=arguments.configuration,
         angle_count=arguments.angles,
         exact_calibration=arguments.exact_calibration,

@@ -9,8 +9,17 @@ from planner.execution.execute import Settings, bring_to, execute
 from planner.execution.free_way import check_ends, nearest_turns, turns_to_start
 from planner.execution.inside_view import ControlView, InsideView, view_of
 from planner.execution.robot_motion import robot_motion
-from planner.execution.run_file import RunConditions, StoredRun, copy_input, save_robot, save_run
+from planner.execution.run_file import (
+    PLAN_FILE,
+    RUN_RESULTS,
+    RunConditions,
+    StoredRun,
+    copy_input,
+    save_robot,
+    save_run,
+)
 from planner.execution.run_input import RunInput, load_run_input
+from planner.execution.run_on import DEFAULT_RUN_ON_DEG
 from planner.execution.run_plots import plot_run
 from planner.execution.run_verification import DEFAULT_TOLERANCE_DEG, RunVerification, verify_run
 from planner.execution.stream import check_it_fits, stream
@@ -18,6 +27,7 @@ from planner.execution.table_motion import PauseTimes, TableMotion
 from planner.execution.table_port import open_port
 from planner.map.map_file import MAP_FILE
 from planner.progress import Progress
+from planner.set_aside import set_aside
 from planner.table.wire import Wire
 from protocol import TableClient
 
@@ -30,6 +40,7 @@ class RunOptions(NamedTuple):
     decimals: int = 1
     timeout_s: float = 1.0
     lead_s: float = Settings().lead_s
+    run_on_deg: float = DEFAULT_RUN_ON_DEG
     tolerance_deg: float = DEFAULT_TOLERANCE_DEG
     control: Path | None = None
     arm_is_away: bool = False
@@ -70,13 +81,13 @@ def run_plan(
         OSError: the folder cannot be written.
     """
     map_file = map_file or plan_file.with_name(MAP_FILE)
+    set_aside(out, (*RUN_RESULTS, PLAN_FILE, MAP_FILE), keep=(plan_file, map_file))
     run_input = load_run_input(plan_file, map_file)
     limits, wire = run_input.problem.limits, Wire(options.decimals, options.baud)
     motion = TableMotion(run_input.plan, limits, options.pause_times)
     check_ends(run_input.problem.map, motion)
-    check_it_fits(stream(motion, limits, wire), wire)
+    check_it_fits(stream(motion, limits, wire, options.run_on_deg), wire)
     out.mkdir(parents=True, exist_ok=True)
-    copy_input(out, plan_file, map_file)
     with ExitStack() as stack:
         table, view = _open(options, stack)
         table_began_s, wall_began_s = table.clock.now_s(), time.perf_counter()
@@ -84,10 +95,14 @@ def run_plan(
         run_input = run_input.turned(turns)
         motion = TableMotion(run_input.plan, limits, options.pause_times)
         bring_to(table, motion.start_deg, limits, wire)
-        record = execute(table, motion, limits, wire, Settings(lead_s=options.lead_s), view, progress)
+        settings = Settings(lead_s=options.lead_s, run_on_deg=options.run_on_deg)
+        record = execute(table, motion, limits, wire, settings, view, progress)
         duration = Duration(table.clock.now_s() - table_began_s, time.perf_counter() - wall_began_s)
-    conditions = RunConditions(options.port, wire, options.lead_s, options.tolerance_deg, turns, options.pause_times)
+    conditions = RunConditions(
+        options.port, wire, options.lead_s, options.tolerance_deg, turns, options.pause_times, options.run_on_deg
+    )
     checked = verify_run(run_input, motion, record, options.lead_s, options.tolerance_deg)
+    copy_input(out, plan_file, map_file)
     save_run(out, run_input, conditions, motion, record, checked)
     save_robot(out, robot_motion(motion, run_input.joints_deg), record)
     plot_run(StoredRun(run_input, conditions, motion, record), checked, out / "run.png")

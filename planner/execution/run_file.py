@@ -28,6 +28,8 @@ from planner.whole_file import whole_file, write_whole
 _FORMAT = "seventh-axis run"
 _FORMAT_VERSION = 1
 PLAN_FILE, RUN_FILE, SEEN_FILE = "plan.json", "run.json", "run.csv"
+RUN_RESULTS = (RUN_FILE, SEEN_FILE, "run.png", "robot.csv", "robot.json", "report.html")
+"""What a run, and the page of it, leave in a folder beside the copies of plan and map."""
 
 
 class RunFileError(PlannerError):
@@ -44,6 +46,7 @@ class RunConditions(NamedTuple):
         tolerance_deg: what the encoder may deviate at a location.
         turns: full turns of the table added to the plan.
         pause_times: how long the robot takes in a pause.
+        run_on_deg: how far the table was to run on at most if the line died; None in a run of an earlier version.
     """
 
     port: str
@@ -52,6 +55,7 @@ class RunConditions(NamedTuple):
     tolerance_deg: float
     turns: int
     pause_times: PauseTimes
+    run_on_deg: float | None = None
 
 
 class StoredRun(NamedTuple):
@@ -93,6 +97,7 @@ def save_run(
             and verification.executed_cost._asdict() | {"total": verification.executed_cost.total},
         },
         "latest_command_s": verification.latest_command_s,
+        "dead_line": verification.dead_line._asdict(),
         "corrections": [each._asdict() for each in record.corrections],
         "commands": [sent._asdict() | {"command": sent.command._asdict()} for sent in record.sent],
     }

@@ -62,11 +62,7 @@ def _summary(run: StoredRun, checked: RunVerification) -> Iterator[tuple[str, st
         yield "full turns added to the plan", f"{conditions.turns}, to start where the table stood"
     yield "commands sent ahead by", f"{1000.0 * conditions.lead_s:g} ms"
     if run.record.sent:
-        yield "if the line had died", f"at most {_longest_run_on_deg(run):.0f} deg until the table stood by itself"
-
-
-def _longest_run_on_deg(run: StoredRun) -> float:
-    return max(abs(sent.command.target_deg - run.motion.state_at(sent.time_s).angle_deg) for sent in run.record.sent)
+        yield "if the line had died", f"{checked.dead_line}"
 
 
 def _deviations(checked: RunVerification) -> Iterator[tuple[str, ...]]:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.arrays import FloatArray
+from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.execution.run_input import RunInput
 from planner.execution.run_record import Observation, Record
 from planner.execution.table_motion import Phase, TableMotion
@@ -44,6 +45,7 @@ class RunVerification(NamedTuple):
             location is unknown.
         latest_command_s: how late the latest command was.
         tolerance_deg: what the encoder may deviate at a location.
+        dead_line: how far the table would have run on if the line had died, and into what.
     """
 
     failure: str | None
@@ -57,6 +59,7 @@ class RunVerification(NamedTuple):
     executed_cost: PathCost | None
     latest_command_s: float
     tolerance_deg: float
+    dead_line: DeadLine
 
     @property
     def worst_deg(self) -> float:
@@ -132,7 +135,17 @@ def verify_run(
         executed_cost=_executed_cost(run_input, motion, located) if known else None,
         latest_command_s=max((sent.late_s for sent in record.sent), default=0.0),
         tolerance_deg=tolerance_deg,
+        dead_line=judge_dead_line(problem.map, motion, record.sent, _end_s(motion, record)),
     )
+
+
+def _end_s(motion: TableMotion, record: Record) -> float:
+    """Return when a run ended: with its motion, or when the table was stopped."""
+    if record.failure is None:
+        return motion.end_s
+    last_sent_s = record.sent[-1].time_s if record.sent else motion.start_s
+    last_seen_s = record.observations[-1].time_s if record.observations else motion.start_s
+    return min(max(last_sent_s, last_seen_s), motion.end_s)
 
 
 class _Series(NamedTuple):

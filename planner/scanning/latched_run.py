@@ -119,6 +119,7 @@ def run_latched(
     limits: Limits,
     wire: Wire,
     conditions: TriggerConditions,
+    settings: Settings | None = None,
     progress: Progress | None = None,
 ) -> LatchedRun:
     """Make the motion of a plan, with the probe firing, and return what was latched.
@@ -131,6 +132,7 @@ def run_latched(
         limits: Greatest S and A.
         wire: What the commands have to pass.
         conditions: How the probe fires.
+        settings: How the motion is run.
         progress: Called with the time of the motion and its end, in ms.
 
     Raises:
@@ -140,7 +142,7 @@ def run_latched(
     """
     motion = ReadingMotion(plan, limits, conditions.rate_hz)
     bring_to(table, round(motion.start_deg, wire.decimals), limits, wire)
-    settings = Settings()
+    settings = settings or Settings()
     record = execute(table, motion, limits, wire, settings, line, progress)
     line.stop()
     times_s = line.times_s() - record.origin_s

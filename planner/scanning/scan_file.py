@@ -24,6 +24,7 @@ def scan_document(scanned: Scanned) -> dict[str, Any]:
             "port": options.port,
             "baud": options.baud,
             "decimals": options.decimals,
+            "run_on_deg": options.run_on_deg,
             "rate_hz": options.triggers.rate_hz,
             "seed": options.seed,
         },

@@ -17,7 +17,9 @@ from planner.arrays import FloatArray
 from planner.cell.cell import Cell, placement
 from planner.cell.scan import Scan
 from planner.errors import PlannerError
+from planner.execution.execute import Settings
 from planner.execution.inside_view import ControlView
+from planner.execution.run_on import DEFAULT_RUN_ON_DEG
 from planner.execution.table_port import open_port
 from planner.geometry.ray_casting import RayCaster
 from planner.kinematics.configuration import Configuration
@@ -66,6 +68,7 @@ class ScanOptions(NamedTuple):
     timeout_s: float = 0.5
     control: Path | None = None
     time_scale: float = 1.0
+    run_on_deg: float = DEFAULT_RUN_ON_DEG
     configuration: str = "best"
     angle_count: int = 360
     exact_calibration: bool = False
@@ -164,8 +167,17 @@ def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) ->
         timeout_s = options.timeout_s * options.time_scale
         table = open_things.enter_context(TableClient(port, timeout_s, options.decimals))
         line = _trigger_line(port, table, options, open_things)
+        settings = Settings(run_on_deg=options.run_on_deg)
         return run_latched(
-            table, line, planned.plan, planned.joints_deg, planned.limits, wire, options.triggers, progress("motion")
+            table,
+            line,
+            planned.plan,
+            planned.joints_deg,
+            planned.limits,
+            wire,
+            options.triggers,
+            settings,
+            progress("motion"),
         )
 
 

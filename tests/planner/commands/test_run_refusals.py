@@ -140,3 +140,62 @@ def test_the_example_that_the_refusals_change_is_a_plan_that_runs(tmp_path: Path
     moved(6, -359.0)(document)
     plan_file.write_text(json.dumps(document), encoding="utf-8")
     assert main(["run", str(plan_file), "--port", "emulator://", "--out", str(tmp_path / "run")]) == 0
+
+
+def names_in(folder: Path) -> set[str]:
+    return {file.name for file in folder.iterdir() if file.is_file()}
+
+
+RUN_FILES = {"run.json", "run.csv", "run.png", "robot.csv", "robot.json", "plan.json", "map.npz"}
+
+
+@pytest.mark.parametrize(
+    "refused",
+    [
+        ["--port", "/dev/no-such-device"],
+        ["--port", "loop://", "--timeout", "0.05"],
+        ["--port", "emulator://", "--baud", "600"],
+        ["--port", "emulator://", "--map", "no-such-map"],
+    ],
+    ids=["no port", "no table", "slow line", "no map"],
+)
+def test_a_refused_run_leaves_no_results_and_loses_none(refused: list[str], tmp_path: Path) -> None:
+    plan_file, out = write_short_scan(tmp_path), tmp_path / "run"
+    assert main(["run", str(plan_file), "--port", "emulator://", "--out", str(out)]) == 0
+    former = (out / "run.json").read_bytes()
+    assert main(["show", str(out)]) == 0
+    assert main(["run", str(plan_file), *refused, "--out", str(out)]) == 2
+    assert names_in(out) == set()
+    assert names_in(out / "previous") == RUN_FILES | {"report.html"}
+    assert (out / "previous" / "run.json").read_bytes() == former
+    assert main(["show", str(out)]) == 2
+    assert main(["show", str(out / "previous")]) == 0
+
+
+def test_a_run_into_the_folder_of_its_plan_keeps_the_plan(tmp_path: Path) -> None:
+    plan_file = write_short_scan(tmp_path)
+    before = plan_file.read_bytes()
+    for port, status in (("emulator://", 0), ("/dev/no-such-device", 2), ("emulator://", 0)):
+        assert main(["run", str(plan_file), "--port", port, "--out", str(tmp_path)]) == status
+        assert plan_file.read_bytes() == before
+        assert (tmp_path / "run.json").exists() == (status == 0)
+
+
+def test_a_plan_that_fails_leaves_no_plan_and_no_run_of_another(tmp_path: Path) -> None:
+    plan_file = write_short_scan(tmp_path)
+    assert main(["run", str(plan_file), "--port", "emulator://", "--out", str(tmp_path)]) == 0
+    assert main(["plan", "no-such-scan", "--out", str(tmp_path)]) == 2
+    assert names_in(tmp_path) == set()
+    assert names_in(tmp_path / "previous") == RUN_FILES
+
+
+@pytest.mark.parametrize(
+    ("command", "names"),
+    [("scan", ["cloud.ply", "cloud.xyz", "scan.json", "report.html"]), ("map", ["map.npz", "map.png"])],
+)
+def test_a_scan_or_map_that_fails_leaves_none_of_another(command: str, names: list[str], tmp_path: Path) -> None:
+    for name in names:
+        (tmp_path / name).write_text("former")
+    assert main([command, "no-such-scan", "--out", str(tmp_path)]) == 2
+    assert names_in(tmp_path) == set()
+    assert names_in(tmp_path / "previous") == set(names)
