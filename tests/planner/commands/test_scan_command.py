@@ -10,6 +10,9 @@ import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.__main__ import main
 from planner.arrays import FloatArray
 from planner.cell.scan import load_scan, shipped_scans
+from planner.kinematics.joint_path import JointPath
+from planner.planning.arm_motion import arm_motion
+from planner.scanning import scan_run
 from planner.scanning.scan_file import scan_document
 from planner.scanning.scan_report import scan_report
 from planner.scanning.scan_run import ScanOptions, scan_workpiece
@@ -199,3 +202,19 @@ def test_an_option_that_cannot_be_meant_is_refused(
         main(["scan", "cylinder", *option, "--out", str(tmp_path)])
     assert exit_status.value.code == 2
     assert option[1] in capsys.readouterr().err
+
+
+def test_a_scan_whose_arm_path_breaks_a_limit_is_refused_before_the_port_is_opened(
+    scan_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def two_turns_on(*arguments: Any) -> JointPath:  # noqa: ANN401 - passed on
+        found = arm_motion(*arguments)
+        return found._replace(joints=found.joints + np.radians([0.0, 0.0, 0.0, 0.0, 0.0, 720.0]))
+
+    monkeypatch.setattr(scan_run, "arm_motion", two_turns_on)
+    monkeypatch.setattr(scan_run, "open_port", lambda *_: pytest.fail("the port was opened"))
+    assert main(["scan", scan_file, *QUICK, "--exact-calibration", "--out", str(tmp_path / "out")]) == 2
+    shown = capsys.readouterr()
+    assert "the arm cannot follow the plan: at location 0 joint 6 is at" in shown.err
+    assert len(shown.err.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
