@@ -10,9 +10,12 @@ from typing import Any, Self
 
 from emulator.faults import Fault, FaultError, fault_from
 from emulator.fixed_point import SPEED_BITS, gain_registers
+from emulator.parameter import brief
 from emulator.toml_section import ConfigError, merged, quantity, section
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
+LONGEST_FILE = 1 << 20
+"""Bytes; a table's constants take a few thousand."""
 
 
 @dataclass(frozen=True)
@@ -195,16 +198,22 @@ def load_config(path: str | Path | None = None) -> TableConfig:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        with path.open("rb") as file:
+            text = file.read(LONGEST_FILE + 1).decode()
+        if len(text) <= LONGEST_FILE:
+            return tomllib.loads(text)
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
+    except RecursionError:
+        raise ConfigError(f"{path}: is not TOML of a table: it is nested too deep") from None
     except ValueError as error:  # tomllib passes on that an integer has too many digits
         raise ConfigError(f"{path}: is not TOML: {error}") from error
+    raise ConfigError(f"{path}: cannot be read: it has more than {LONGEST_FILE} bytes; is it a table's configuration?")
 
 
 def _faults(entries: object, where: str) -> tuple[Fault, ...]:
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise ConfigError(f"{where} is {entries!r}; each fault is a table of its own, [[faults]]")
+        raise ConfigError(f"{where} is {brief(entries)}; each fault is a table of its own, [[faults]]")
     try:
         return tuple(
             fault_from(entry.get("fault"), {key: value for key, value in entry.items() if key != "fault"})

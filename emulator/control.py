@@ -12,7 +12,7 @@ LONGEST_REQUEST = 4096
 """Bytes in a request, its line feed included."""
 
 MOST_CLIENTS = 64
-"""Clients at once; the descriptors of a crowd would be more than `select` and the system bear."""
+"""Clients at once; a crowd would take all descriptors that the system allows."""
 
 _BACKLOG = 16
 _OWNER_ONLY = 0o177
@@ -56,7 +56,7 @@ class ControlSocket:
         """Take in new clients and answer every request that has come in whole."""
         # Nobody is left, or the next one is gone again, or the system is short of descriptors: then it waits.
         with suppress(OSError):
-            while True:
+            for _ in range(_BACKLOG):  # and no more at a time: a crowd must not keep the table from its clients
                 self._welcome(self._listener.accept()[0])
         for client in list(self._clients):
             if not self._serve_client(client, stand):
@@ -106,9 +106,12 @@ def _clear_stale(path: Path) -> None:
     if not path.is_socket():
         return
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        probe.setblocking(False)
         try:
             probe.connect(str(path))
         except ConnectionRefusedError:
             path.unlink()
-        else:
-            raise OSError(errno.EADDRINUSE, "another stand-in listens there")
+            return
+        except BlockingIOError:
+            pass  # The listener's queue is full: it lives, although it takes nobody in.
+    raise OSError(errno.EADDRINUSE, "another emulator listens there")

@@ -7,9 +7,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from emulator.control_commands import COMMANDS
+from emulator.control_commands import COMMANDS, RequestError, parsed_line
 
 _TIMEOUT_S = 5.0
+_LONGEST_ANSWER = 1 << 16
 _EXAMPLE = """example:
   python -m emulator --pty --control table.control
   python -m emulator.control_client table.control trigger
@@ -34,24 +35,24 @@ def request(path: Path, command: str, **parameters: float) -> dict[str, Any]:
             connection.connect(str(path))
             connection.sendall(line)
             with connection.makefile("rb") as replies:
-                reply = replies.readline()
+                reply = replies.readline(_LONGEST_ANSWER)
     except OSError as error:
-        raise ControlError(f"{path}: {error}; start a stand-in with --control {path}") from error
+        raise ControlError(f"{path}: {error}; start an emulator with --control {path}") from error
     if not reply:
         raise ControlError(f"{path}: the stand-in hung up without an answer")
     result = _result(reply)
     if result is None:
         raise ControlError(f"{path}: {reply[:80]!r} is no answer of a stand-in; is this its control channel?")
-    if not result.pop("ok"):
-        raise ControlError(result["error"])
+    if not result.pop("ok", False):
+        raise ControlError(str(result["error"]))
     return result
 
 
 def _result(reply: bytes) -> dict[str, Any] | None:
     """Return an answer's fields, or None where it is none."""
     try:
-        fields = json.loads(reply)
-    except ValueError:
+        fields = parsed_line(reply)
+    except RequestError:
         return None
     return fields if isinstance(fields, dict) and ("error" in fields or fields.get("ok") is True) else None
 

@@ -8,8 +8,9 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
 
+from emulator.clock import TIME_SCALE
 from emulator.faults import KINDS, Fault, FaultError, fault_from, parameters_of
-from emulator.parameter import Parameter
+from emulator.parameter import Parameter, brief
 from emulator.status import TableStatus
 
 
@@ -93,7 +94,7 @@ COMMANDS: Mapping[str, Command] = {
     ),
     "time-scale": Command(
         "run faster or slower than real time",
-        (Parameter("time_scale", 1e-3, 1e4, "simulated seconds in a real second"),),
+        (TIME_SCALE,),
         lambda stand, given: stand.set_time_scale(given["time_scale"]),
     ),
     "reset": Command("cut the table's power and switch it on again", (), lambda stand, _: stand.reset()),
@@ -123,14 +124,11 @@ def answer(request: bytes, stand: Stand) -> bytes:
 
 
 def _parse(request: bytes) -> tuple[Command, dict[str, float]]:
-    try:
-        fields = json.loads(request)
-    except (ValueError, RecursionError):
-        raise RequestError('a request is one line of JSON, such as {"command": "state"}') from None
+    fields = parsed_line(request)
     if not isinstance(fields, dict) or not isinstance(name := fields.pop("command", None), str):
         raise RequestError('a request is a JSON object that names its command, such as {"command": "state"}')
     if name not in COMMANDS:
-        raise RequestError(f"'{name}' is no command; there are {', '.join(COMMANDS)}")
+        raise RequestError(f"{brief(name)} is no command; there are {', '.join(COMMANDS)}")
     command = COMMANDS[name]
     required = {parameter.name for parameter in command.parameters if not parameter.optional}
     if not required <= fields.keys() <= {parameter.name for parameter in command.parameters}:
@@ -145,10 +143,31 @@ def _parse(request: bytes) -> tuple[Command, dict[str, float]]:
     }
 
 
+def parsed_line(line: bytes) -> Any:  # noqa: ANN401  # whatever JSON holds
+    """Return the value of a line of JSON.
+
+    Raises:
+        RequestError: it is not JSON, nested too deep, or a name occurs twice in an object.
+    """
+    try:
+        return json.loads(line, object_pairs_hook=_object)
+    except RequestError:
+        raise
+    except (ValueError, RecursionError):
+        raise RequestError('a request is one line of JSON, such as {"command": "state"}') from None
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    fields = dict(pairs)
+    if len(fields) < len(pairs):
+        raise RequestError("a request names each parameter once")
+    return fields
+
+
 def _number(command: str, parameter: Parameter, value: Any) -> float:  # noqa: ANN401  # from outside
     if parameter.accepts(value):
         return float(value)
-    raise RequestError(f"{command}: {parameter.name} must be {parameter.allowed}, not {json.dumps(value)}")
+    raise RequestError(f"{command}: {parameter.name} must be {parameter.allowed}, not {brief(value)}")
 
 
 def refusal(sentence: str) -> bytes:

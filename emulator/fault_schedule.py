@@ -8,7 +8,10 @@ from collections.abc import Iterable
 from random import Random
 from typing import NamedTuple
 
-from emulator.faults import KINDS, Fault
+from emulator.faults import KINDS, Fault, FaultError
+
+MOST_PLANS = 1000
+"""Faults that may wait at once: each is looked at whenever one begins."""
 
 
 class Plan(NamedTuple):
@@ -64,7 +67,12 @@ class FaultSchedule:
 
         Returns:
             Whether the port goes away with this, as after `begin_tick` and `begin_line`.
+
+        Raises:
+            FaultError: too many wait already.
         """
+        if len(self._plans) >= MOST_PLANS:
+            raise FaultError(f"{MOST_PLANS} faults wait for their beginning; no more are taken until some have begun")
         begin = None if fault.at_command is not None else tick
         if fault.at_s is not None:
             begin = max(round(fault.at_s * self._tick_hz), tick)

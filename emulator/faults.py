@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from emulator.parameter import Parameter
+from emulator.parameter import Parameter, brief
 
 
 class FaultError(ValueError):
@@ -115,7 +115,7 @@ def fault_from(kind: object, given: Mapping[str, object]) -> Fault:
         FaultError: there is no such fault, a number is missing, unknown or out of its range, or it has two beginnings.
     """
     if not isinstance(kind, str) or kind not in KINDS:
-        raise FaultError(f"{kind!r} is no fault; there are {', '.join(KINDS)}")
+        raise FaultError(f"{brief(kind)} is no fault; there are {', '.join(KINDS)}")
     _check_numbers(kind, given)
     numbers = {name: float(value) for name, value in given.items() if isinstance(value, int | float)}
     own = (parameter.name for parameter in KINDS[kind].parameters)
@@ -134,11 +134,13 @@ def _check_numbers(kind: str, given: Mapping[str, object]) -> None:
     unknown = sorted(set(given) - {parameter.name for parameter in parameters})
     if unknown:
         names = ", ".join(parameter.name for parameter in parameters)
-        raise FaultError(f"{kind}: {unknown[0]} is not known; it takes {names}")
+        raise FaultError(f"{kind}: {unknown[0][:60]} is not known; it takes {names}")
     for parameter in parameters:
         if parameter.name not in given and not parameter.optional:
             raise FaultError(f"{kind}: {parameter.name} is missing; it must be {parameter.allowed}")
         if parameter.name in given and not parameter.accepts(given[parameter.name]):
-            raise FaultError(f"{kind}: {parameter.name} is {given[parameter.name]!r}; it must be {parameter.allowed}")
+            raise FaultError(
+                f"{kind}: {parameter.name} is {brief(given[parameter.name])}; it must be {parameter.allowed}"
+            )
     if "at_s" in given and "at_command" in given:
         raise FaultError(f"{kind}: at_s and at_command are two beginnings; give one of them")

@@ -7,6 +7,8 @@ import math
 from dataclasses import field, fields, is_dataclass
 from typing import Any, get_type_hints
 
+from emulator.parameter import brief
+
 
 class ConfigError(ValueError):
     """A configuration that cannot be used; the message names the file, the key and what is allowed."""
@@ -32,10 +34,10 @@ def merged(defaults: dict[str, Any], changes: dict[str, Any], source: str, where
     result = dict(defaults)
     for key, value in changes.items():
         if key not in defaults:
-            raise ConfigError(f"{source}: {where + key} is not a key; allowed here are {', '.join(defaults)}")
+            raise ConfigError(f"{source}: {where}{key[:60]} is not a key; allowed here are {', '.join(defaults)}")
         nested = isinstance(defaults[key], dict)
         if nested and not isinstance(value, dict):
-            raise ConfigError(f"{source}: {where + key} must be a section, not {value!r}")
+            raise ConfigError(f"{source}: {where + key} must be a section, not {brief(value)}")
         result[key] = merged(defaults[key], value, source, f"{where}{key}.") if nested else value
     return result
 
@@ -65,11 +67,11 @@ def _number(wanted: type, value: object, limits: Any, where: str) -> float | int
     if wanted is bool or isinstance(value, bool):
         if wanted is bool and isinstance(value, bool):
             return value
-        raise ConfigError(f"{where} is {value!r}; it must be {'true or false' if wanted is bool else 'a number'}")
+        raise ConfigError(f"{where} is {brief(value)}; it must be {'true or false' if wanted is bool else 'a number'}")
     if not isinstance(value, int if wanted is int else (int, float)):
-        raise ConfigError(f"{where} is {value!r}; it must be a {'whole number' if wanted is int else 'number'}")
+        raise ConfigError(f"{where} is {brief(value)}; it must be a {'whole number' if wanted is int else 'number'}")
     if isinstance(value, float) and not math.isfinite(value):
-        raise ConfigError(f"{where} is {value!r}; it must be finite")
+        raise ConfigError(f"{where} is {brief(value)}; it must be finite")
     above, least, most = (limits[key] for key in ("above", "least", "most"))
     broken = (
         (above is not None and value <= above, f"greater than {above}"),
@@ -78,5 +80,5 @@ def _number(wanted: type, value: object, limits: Any, where: str) -> float | int
     )
     for is_broken, allowed in broken:
         if is_broken:
-            raise ConfigError(f"{where} is {value!r}; it must be {allowed}")
+            raise ConfigError(f"{where} is {brief(value)}; it must be {allowed}")
     return wanted(value)  # type: ignore[no-any-return]  # int or float

@@ -2,11 +2,12 @@
 
 import json
 import os
+import random
 import resource
 import socket
 import stat
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
@@ -39,7 +40,7 @@ def test_a_socket_that_a_dead_stand_in_left_is_replaced(folder: Path) -> None:
 
 
 def test_a_socket_that_is_served_is_left_alone(served: Path) -> None:
-    with pytest.raises(OSError, match="another stand-in"):
+    with pytest.raises(OSError, match="another emulator"):
         ControlSocket(served)
     assert request(served, "trigger") == {}
 
@@ -124,3 +125,40 @@ def test_a_crowd_of_clients_is_turned_away_and_those_who_were_there_are_served(f
         latecomer.sendall(b'{"command": "reset"}\n')
         control.serve(stand)
     assert stand.done == ["trigger", "reset"]
+
+
+def test_a_listener_that_takes_nobody_in_is_neither_waited_for_nor_removed(folder: Path) -> None:
+    path = folder / "control"
+    with ExitStack() as stack:
+        deaf = stack.enter_context(socket.socket(socket.AF_UNIX))
+        deaf.bind(str(path))
+        deaf.listen(0)
+        for _ in range(3):  # until its queue is full
+            waiting = stack.enter_context(socket.socket(socket.AF_UNIX))
+            waiting.setblocking(False)
+            with suppress(BlockingIOError):
+                waiting.connect(str(path))
+        with pytest.raises(OSError, match="another emulator"):
+            ControlSocket(path)
+        assert path.is_socket()
+
+
+def test_thousands_of_connections_and_any_bytes_keep_nobody_from_the_table(folder: Path, stand: QuietStand) -> None:
+    chance = random.Random(1)  # noqa: S311  # a test's draw
+    control = ControlSocket(folder / "control")
+    with ExitStack() as stack:
+        stack.callback(control.close)
+        for index in range(2000):
+            with socket.socket(socket.AF_UNIX) as client:
+                client.connect(str(control.path))
+                client.sendall(chance.randbytes(chance.randint(0, 200)) + b"\n" * chance.randint(0, 3))
+                if index % 7 == 0:
+                    control.serve(stand)
+        while len(control.input_descriptors) > 1:
+            control.serve(stand)
+        friend = stack.enter_context(socket.socket(socket.AF_UNIX))
+        friend.connect(str(control.path))
+        friend.sendall(b'{"command": "trigger"}\n')
+        control.serve(stand)
+        assert json.loads(friend.recv(4096)) == {"ok": True}
+    assert stand.done == ["trigger"]
