@@ -5,11 +5,12 @@ rest costs nothing and a line drawn through the rows is still the true one.
 """
 
 import csv
-from array import array
+import os
+from contextlib import suppress
 from operator import attrgetter
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from emulator.status import TableStatus
 
@@ -45,31 +46,50 @@ _values_of = attrgetter(*_NUMBERS[1:], *_WORDS)
 _Values = tuple[float | str, ...]
 
 
+class TraceError(Exception):
+    """A trace that cannot be begun or completed; the message says what there is of it, and what to do."""
+
+
 class TraceWriter:
-    """A recorder for `Table.observer`. The file appears under its name when the trace is closed, and not before.
+    """A recorder for `Table.observer`. The file appears under its name when the trace is complete, and not before.
+
+    Until then a CSV grows under the name with `.part` appended, for an npz too. A failure leaves it there.
 
     Args:
-        path: ends in `.csv` or `.npz`. A CSV is written as it comes; an npz is kept in memory until the end.
+        path: ends in `.csv` or `.npz`.
         tick_hz: ticks in a simulated second.
 
     Raises:
-        ValueError: the path ends in something else.
-        OSError: the file cannot be written.
+        TraceError: the file cannot be written in the end, as far as that can be told now.
     """
 
     def __init__(self, path: Path, tick_hz: int) -> None:
-        if path.suffix not in {".csv", ".npz"}:
-            raise ValueError(f"{path}: the name of a trace must end in .csv or .npz")
+        _check_name(path)
         self._path = path
         self._tick_hz = tick_hz
         self._partial = path.with_name(path.name + ".part")
-        self._sink: _Sink = _CsvSink(self._partial) if path.suffix == ".csv" else _NpzSink(self._partial)
+        try:
+            # Exclusively: another emulator's trace is left alone, and no symbolic link is followed.
+            self._file = self._partial.open("x", encoding="ascii", newline="")
+        except FileExistsError:
+            raise TraceError(
+                f"{self._partial} exists: another emulator writes it, or one that failed left it; "
+                "choose another name, or remove it"
+            ) from None
+        except OSError as error:
+            raise TraceError(f"{path}: {error.strerror}; choose another name") from error
+        self._writer = csv.writer(self._file, lineterminator="\n")
         self._last_tick = -1
         self._written_tick = -1
         self._last: _Values = ()
+        self._write_row(_COLUMNS)
 
     def record(self, status: TableStatus, received: bytes, transmitted: bytes) -> None:
-        """Take in one tick."""
+        """Record one tick.
+
+        Raises:
+            TraceError: what was written until now stays under the name that ends in `.part`.
+        """
         values: _Values = _values_of(status)
         if values != self._last or received or transmitted:
             self._write_held(status.tick - 1)
@@ -77,10 +97,27 @@ class TraceWriter:
         self._last, self._last_tick = values, status.tick
 
     def close(self) -> None:
-        """Complete the file and give it its name."""
+        """Complete the file and give it its name.
+
+        Raises:
+            TraceError: what was written until now stays under the name that ends in `.part`.
+        """
         self._write_held(self._last_tick)
-        self._sink.close()
-        self._partial.replace(self._path)
+        try:
+            self._file.flush()
+            os.fsync(self._file.fileno())  # some file systems notice only here that they are full
+            self._file.close()
+            if self._path.suffix == ".csv":
+                self._partial.replace(self._path)
+            else:
+                _pack(self._partial, self._path)
+        except (OSError, MemoryError) as error:
+            raise self._failed(error) from error
+
+    def abandon(self) -> None:
+        """Leave what was written under the name that ends in `.part`."""
+        with suppress(OSError):
+            self._file.close()
 
     def __enter__(self) -> Self:
         return self
@@ -88,7 +125,10 @@ class TraceWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self.close()
+        if kind is None:
+            self.close()
+        else:
+            self.abandon()
 
     def _write_held(self, tick: int) -> None:
         """Write the last tick of a stretch without change, when it is not there yet."""
@@ -96,8 +136,20 @@ class TraceWriter:
             self._write(tick, self._last, b"", b"")
 
     def _write(self, tick: int, values: _Values, received: bytes, transmitted: bytes) -> None:
-        self._sink.add((tick / self._tick_hz, *values), received, transmitted)
+        self._write_row((tick / self._tick_hz, *values, _as_text(received), _as_text(transmitted)))
         self._written_tick = tick
+
+    def _write_row(self, row: tuple[float | str, ...]) -> None:
+        try:
+            self._writer.writerow(row)
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: OSError | MemoryError) -> TraceError:
+        """Close the file, and return the error that names what is left of it."""
+        self.abandon()
+        reason = (isinstance(error, OSError) and error.strerror) or "out of memory"
+        return TraceError(f"{self._path}: {reason}; what was written until then is in {self._partial}, as CSV")
 
 
 def read_trace(path: Path) -> Trace:
@@ -124,50 +176,39 @@ def read_trace(path: Path) -> Trace:
     return Trace(*columns_as)
 
 
-class _Sink(Protocol):
-    def add(self, values: _Values, received: bytes, transmitted: bytes) -> None: ...
-
-    def close(self) -> None: ...
-
-
-class _CsvSink:
-    """Rows straight to the file, under a header of column names that end in their unit."""
-
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("w", encoding="ascii", newline="")
-        self._writer = csv.writer(self._file, lineterminator="\n")
-        self._writer.writerow(_COLUMNS)
-
-    def add(self, values: _Values, received: bytes, transmitted: bytes) -> None:
-        self._writer.writerow((*values, _as_text(received), _as_text(transmitted)))
-
-    def close(self) -> None:
-        self._file.close()
+def _check_name(path: Path) -> None:
+    """Refuse at the start of a run what would lose its trace at the end."""
+    if path.suffix not in {".csv", ".npz"}:
+        raise TraceError(f"{path}: the name of a trace must end in .csv or .npz")
+    if path.is_dir():
+        raise TraceError(f"{path}: is a folder; choose another name")
+    if path.suffix == ".npz":
+        try:
+            import numpy  # noqa: F401, PLC0415, ICN001  # whether it can be imported; only npz needs it
+        except ImportError:
+            raise TraceError(
+                f"{path}: .npz needs numpy; name a .csv file, or run: pip install 'seventh-axis[planner]'"
+            ) from None
 
 
-class _NpzSink:
-    """Columns in memory, packed at the end."""
+def _pack(source: Path, path: Path) -> None:
+    """Write a trace as npz, and remove the CSV that it was."""
+    import numpy as np  # noqa: PLC0415  # only who asks for npz needs numpy
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._numbers = [array("d") for _ in _NUMBERS]
-        self._texts: list[list[str]] = [[] for _ in (*_WORDS, *_BYTES)]
-        path.touch()
-
-    def add(self, values: _Values, received: bytes, transmitted: bytes) -> None:
-        for column, number in zip(self._numbers, values, strict=False):
-            column.append(float(number))
-        words = map(str, values[len(_NUMBERS) :])
-        for texts, text in zip(self._texts, (*words, _as_text(received), _as_text(transmitted)), strict=True):
-            texts.append(text)
-
-    def close(self) -> None:
-        import numpy as np  # noqa: PLC0415  # only who asks for npz needs numpy
-
-        arrays = [np.array(column) for column in (*self._numbers, *self._texts)]
-        columns: dict[str, Any] = dict(zip(_COLUMNS, arrays, strict=True))
-        with self._path.open("wb") as file:
+    trace = read_trace(source)._asdict()
+    texts = {name: [_as_text(data) for data in trace[name]] for name in _BYTES}
+    columns: dict[str, Any] = {name: np.array(column) for name, column in (trace | texts).items()}
+    packed = path.with_name(f"{path.name}.{os.getpid()}.part")
+    with packed.open("xb") as file:
+        try:
             np.savez_compressed(file, **columns)
+            file.flush()
+            os.fsync(file.fileno())
+        except BaseException:
+            packed.unlink()
+            raise
+    packed.replace(path)
+    source.unlink()
 
 
 def _read_csv(path: Path) -> dict[str, list[str]]:

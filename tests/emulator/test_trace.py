@@ -1,11 +1,18 @@
+import errno
+import resource
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 import pytest
 
 from emulator.config import load_config
 from emulator.table import Table
-from emulator.trace import TraceWriter, read_trace
+from emulator.trace import TraceError, TraceWriter, read_trace
 
 TICK_HZ = 1000
 
@@ -96,7 +103,7 @@ def test_any_bytes_on_the_wire_survive(tmp_path: Path) -> None:
 
 
 def test_a_name_with_another_ending_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"\.csv or \.npz"):
+    with pytest.raises(TraceError, match=r"\.csv or \.npz"):
         TraceWriter(tmp_path / "run.txt", TICK_HZ)
 
 
@@ -106,3 +113,88 @@ def test_a_file_that_is_no_trace_is_refused(tmp_path: Path) -> None:
     for name in ("other.csv", "other.npz"):
         with pytest.raises(ValueError, match="is no trace"):
             read_trace(tmp_path / name)
+
+
+@contextmanager
+def largest_file(size: int) -> Iterator[None]:
+    """Let no file of this process grow beyond a size, as on a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit of file sizes")
+@pytest.mark.parametrize("name", ["run.csv", "run.npz"])
+@pytest.mark.parametrize("size", [0, 100, 20_000, 100_000])
+def test_a_disk_that_is_full_leaves_what_was_written_until_then(tmp_path: Path, name: str, size: int) -> None:
+    path = tmp_path / name
+    path.write_text("an older run")
+    with largest_file(size), pytest.raises(TraceError, match=r"run\.\w+\.part, as CSV"):
+        record(path)
+    assert sorted(file.name for file in tmp_path.iterdir()) == [name, f"{name}.part"]
+    assert path.read_text() == "an older run"
+    assert (tmp_path / f"{name}.part").stat().st_size == size
+
+
+def test_a_disk_that_is_full_when_an_npz_is_packed_leaves_the_run_as_csv(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(file: IO[bytes], **_columns: object) -> None:
+        file.write(b"PK")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", full)
+    with pytest.raises(TraceError, match="No space left on device; what was written"):
+        record(tmp_path / "run.npz")
+    assert [file.name for file in tmp_path.iterdir()] == ["run.npz.part"]
+    assert read_trace(tmp_path / "run.npz.part").time_s[-1] == 2.1
+
+
+def test_a_run_that_fails_for_another_reason_leaves_no_torn_file_under_the_name(tmp_path: Path) -> None:
+    def fail() -> None:
+        with TraceWriter(tmp_path / "run.csv", TICK_HZ) as trace:
+            trace.record(Table(load_config()).status(), b"", b"")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert [file.name for file in tmp_path.iterdir()] == ["run.csv.part"]
+    assert len(read_trace(tmp_path / "run.csv.part").time_s) == 1
+
+
+def test_a_trace_that_another_writes_is_left_to_it(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    with TraceWriter(path, TICK_HZ) as first:
+        with pytest.raises(TraceError, match="another emulator writes it"):
+            TraceWriter(path, TICK_HZ)
+        first.record(Table(load_config()).status(), b"H", b"")
+    assert read_trace(path).received == [b"H"]
+
+
+@pytest.mark.parametrize("target", ["thesis.tex", "none"])
+def test_a_symbolic_link_in_the_place_of_the_partial_file_is_not_followed(tmp_path: Path, target: str) -> None:
+    (tmp_path / "thesis.tex").write_text("three years of work")
+    (tmp_path / "run.csv.part").symlink_to(tmp_path / target)
+    with pytest.raises(TraceError, match=r"run\.csv\.part exists"):
+        TraceWriter(tmp_path / "run.csv", TICK_HZ)
+    assert (tmp_path / "thesis.tex").read_text() == "three years of work"
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_folder_cannot_become_a_trace(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").mkdir()
+    with pytest.raises(TraceError, match="is a folder"):
+        TraceWriter(tmp_path / "run.csv", TICK_HZ)
+    assert [file.name for file in tmp_path.iterdir()] == ["run.csv"]
+
+
+def test_an_npz_is_refused_at_the_start_where_numpy_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "numpy", None)
+    with pytest.raises(TraceError, match=r"needs numpy; name a \.csv file"):
+        TraceWriter(tmp_path / "run.npz", TICK_HZ)
+    TraceWriter(tmp_path / "run.csv", TICK_HZ).close()
