@@ -13,14 +13,14 @@ class DeviceLink:
     """A link to a pty, put there atomically and taken away by `remove`.
 
     Raises:
-        FileExistsError: something else than a link to a pty is at the path.
+        FileExistsError: something else than a link to a pty is at the path, or the pty that it leads to is there.
         OSError: the path cannot be written.
     """
 
     def __init__(self, path: Path, device: str) -> None:
         self.path = path
         self._device = device
-        self.replaced = _target(path)
+        self.replaced = _target(path, device)
         """The pty that an older link at this path led to, or None."""
         if self.replaced is None:
             path.symlink_to(device)
@@ -31,10 +31,10 @@ class DeviceLink:
         """Lead to another device from now on.
 
         Raises:
-            FileExistsError: something else than a link to a pty has taken the link's place.
+            FileExistsError: something else than a link to a pty has taken the link's place, or another's link.
             OSError: the path cannot be written.
         """
-        _target(self.path)
+        _target(self.path, device)
         _replace(self.path, device)
         self._device = device
 
@@ -45,13 +45,18 @@ class DeviceLink:
                 self.path.unlink()
 
 
-def _target(path: Path) -> str | None:
-    """Return the pty that the link leads to, or None when nothing is there."""
+def _target(path: Path, device: str) -> str | None:
+    """Return the pty that the link leads to, or None when nothing is there.
+
+    A pty is there as long as the program that made it: a link to one, `device` excepted, is another emulator's.
+    """
     if not os.path.lexists(path):
         return None
     target = str(path.readlink()) if path.is_symlink() else ""
     if not target.startswith(_PTY_PREFIXES):
         raise FileExistsError(errno.EEXIST, "something else than a link to a pty is there")
+    if target != device and Path(target).exists():
+        raise FileExistsError(errno.EEXIST, f"it leads to {target}, which another emulator serves")
     return target
 
 

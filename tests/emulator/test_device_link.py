@@ -1,3 +1,5 @@
+import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -69,3 +71,34 @@ def test_a_link_whose_place_another_file_has_taken_leads_nowhere_new(tmp_path: P
 def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         DeviceLink(tmp_path / "none" / "table", DEVICE)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other names of ptys")
+def test_the_link_of_a_living_emulator_is_left_to_it_and_that_of_a_dead_one_is_taken(tmp_path: Path) -> None:
+    path = tmp_path / "table"
+    server, device = os.openpty()
+    name = os.ttyname(device)
+    first = DeviceLink(path, name)
+    with pytest.raises(FileExistsError, match="another emulator"):
+        DeviceLink(path, DEVICE)
+    assert path.readlink() == Path(name)
+    DeviceLink(path, name)  # its own, that one left behind which had the same device before
+    os.close(device)
+    os.close(server)
+    second = DeviceLink(path, DEVICE)
+    assert second.replaced == name
+    first.remove()
+    assert path.readlink() == Path(DEVICE)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other names of ptys")
+def test_a_device_that_comes_back_does_not_take_the_link_of_another(tmp_path: Path) -> None:
+    path = tmp_path / "table"
+    link = DeviceLink(path, OTHER_DEVICE)
+    server, device = os.openpty()
+    DeviceLink(path, os.ttyname(device))
+    with pytest.raises(FileExistsError, match="another emulator"):
+        link.lead_to(DEVICE)
+    assert path.readlink() == Path(os.ttyname(device))
+    os.close(device)
+    os.close(server)
