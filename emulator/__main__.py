@@ -10,14 +10,16 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from emulator.clock import Clock
+from emulator.clock import TIME_SCALE, Clock
 from emulator.config import TableConfig, load_config
+from emulator.parameter import brief
 from emulator.port import Port
 from emulator.server import SERVED_SIGNALS, Server
 from emulator.signals import SignalWatch
 from emulator.table import Table
 from emulator.tcp_port import TcpPort, parse_address
 from emulator.toml_section import ConfigError
+from emulator.trace import TraceError, TraceWriter
 
 _EXAMPLE = """example:
   python -m emulator --pty --link ./table &
@@ -26,6 +28,8 @@ _EXAMPLE = """example:
 The first line on stdout is the port that a client opens: the device, or a URL for pyserial. SIGUSR1 is the probe's
 trigger; Ctrl-C or SIGTERM end the stand-in with status 0.
 """
+
+_MOST_DIGITS = 30
 
 if TYPE_CHECKING:
     from emulator.control import ControlSocket
@@ -54,8 +58,11 @@ def main(arguments: list[str] | None = None) -> int:
     except (UsageError, ConfigError) as error:
         _say(str(error))
         return 2
+    except TraceError as error:
+        _say(f"--trace {error}")
+        return 2
     except OSError as error:
-        _say(f"cannot go on: {error}; see that there is room for the trace, and that stdout is read")
+        _say(f"cannot go on: {error}; see that stdout is read")
         return 2
     return 0
 
@@ -82,7 +89,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--link", metavar="PATH", type=Path, help="a symbolic link to the pseudo-terminal, removed at the end")
     add("--tcp", metavar="[HOST:]PORT", type=_address, help="listen on TCP and print the URL; port 0 is any free one")
     add("--baud", metavar="N", type=int, help="baud rate of the table (default 9600); 0: bytes take no time")
-    add("--time-scale", metavar="X", type=_positive, default=1.0, help="simulated seconds in a real one (default 1)")
+    add("--time-scale", metavar="X", type=_time_scale, default=1.0, help="simulated seconds in a real one (default 1)")
     add("--decimals", metavar="N", type=int, help="decimals of angles in replies (default 1)")
     add("--strict-table1", action="store_true", help="no error replies: the protocol as the paper prints it")
     add("--config", metavar="FILE", type=Path, help="TOML file with the constants of the table that differ")
@@ -100,10 +107,10 @@ def _address(text: str) -> tuple[str, int]:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def _positive(text: str) -> float:
+def _time_scale(text: str) -> float:
     value = _rate(text)
-    if value == 0.0:
-        raise argparse.ArgumentTypeError("it must be greater than 0")
+    if not TIME_SCALE.accepts(value):
+        raise argparse.ArgumentTypeError(f"it must be {TIME_SCALE.allowed}")
     return value
 
 
@@ -113,13 +120,15 @@ def _rate(text: str) -> float:
     except ValueError:
         value = math.nan
     if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 0 up")
+        raise argparse.ArgumentTypeError(f"{brief(text)} is not a number from 0 up")
     return value
 
 
 def _seed(text: str) -> int:
-    if not (text.isascii() and text.isdigit()):
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 0 up")
+    if not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS):
+        raise argparse.ArgumentTypeError(
+            f"{brief(text)} is not a whole number from 0 up, of at most {_MOST_DIGITS} digits"
+        )
     return int(text)
 
 
@@ -134,11 +143,12 @@ def _serve(options: argparse.Namespace, config: TableConfig, stack: ExitStack) -
     if options.trace:
         _start_trace(options.trace, table, config, stack)
     clock = Clock(config.control.tick_hz, options.time_scale)
+    server = Server(table, clock, ports, signals, control, _say)
+    rate = f"{config.serial.baud} baud, 8N1" if config.serial.baud else "any baud rate, 8N1"
     for port in ports:
         print(port.name, flush=True)
-    rate = f"{config.serial.baud} baud, 8N1" if config.serial.baud else "any baud rate, 8N1"
     _say(f"the table is ready ({rate}); Ctrl-C ends it")
-    Server(table, clock, ports, signals, control, _say).run()
+    server.run()
 
 
 def _open_ports(options: argparse.Namespace, config: TableConfig, stack: ExitStack) -> list[Port]:
@@ -185,11 +195,7 @@ def _open_control(path: Path, stack: ExitStack) -> "ControlSocket":
 
 
 def _start_trace(path: Path, table: Table, config: TableConfig, stack: ExitStack) -> None:
-    from emulator.trace import TraceWriter  # noqa: PLC0415  # rarely asked for, and a start should be quick
-
-    with _usage("--trace"):
-        trace = stack.enter_context(TraceWriter(path, config.control.tick_hz))
-    table.observer = trace.record
+    table.observer = stack.enter_context(TraceWriter(path, config.control.tick_hz)).record
 
 
 @contextmanager

@@ -1,8 +1,11 @@
 """Map wall time to simulated ticks: the only reader of the wall clock in this package."""
 
-import math
 import time
 from collections.abc import Callable
+
+from emulator.parameter import Parameter
+
+TIME_SCALE = Parameter("time_scale", 1e-3, 1e6, "simulated seconds in a real second")
 
 
 class Clock:
@@ -12,7 +15,7 @@ class Clock:
 
     Args:
         tick_hz: ticks in a simulated second.
-        time_scale: simulated seconds in a wall second, greater than 0.
+        time_scale: simulated seconds in a wall second, within `TIME_SCALE`.
         wall_s: source of monotonic wall time in seconds.
     """
 
@@ -43,8 +46,8 @@ class Clock:
 
     def set_time_scale(self, time_scale: float) -> None:
         """Count on from the present instant at another rate."""
-        if not (math.isfinite(time_scale) and time_scale > 0.0):
-            raise ValueError(f"the time scale must be greater than 0, not {time_scale}")
+        if not TIME_SCALE.accepts(time_scale):
+            raise ValueError(f"the time scale must be {TIME_SCALE.allowed}, not {time_scale}")
         self.set_ticks(self.now_ticks())
         self._time_scale = time_scale
 

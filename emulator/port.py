@@ -1,18 +1,28 @@
 """What a way in to the table is to the server: bytes both ways, and clients that come and go."""
 
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
+
+_BAD_BYTE: Final = b"\x18"  # CAN, as in clause 8.3/1 of the protocol
 
 
 class Arrival(NamedTuple):
     """What clients did since the last look.
 
     `left_before` and `left_after` say that a client went away before or after `data` was sent: a half line that it
-    left behind ends there.
+    left behind ends there. Of so many lines of `data`, from its first, as are `doubtful_lines` nobody
+    can tell whose they are: they may not be carried out.
     """
 
     left_before: bool = False
     data: bytes = b""
     left_after: bool = False
+    doubtful_lines: int = 0
+
+
+def spoiled(data: bytes, lines: int) -> bytes:
+    """Return bytes whose first lines are not carried out: each that is not empty is refused for a bad byte."""
+    pieces = data.split(b"\r")
+    return b"\r".join([_BAD_BYTE + piece if piece else piece for piece in pieces[:lines]] + pieces[lines:])
 
 
 class Port(Protocol):

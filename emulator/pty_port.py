@@ -7,23 +7,66 @@ here blocks, and the clients that come and go are watched.
 import fcntl
 import os
 import termios
+import time
 import tty
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from emulator.device_link import DeviceLink
 from emulator.framing import rates_agree, read_at_rate
 from emulator.inotify import CLOSED, OPENED, WRITTEN, DeviceWatch
 from emulator.outbox import Outbox
 from emulator.port import Arrival
+from emulator.readiness import wait_for
 from emulator.terminal_baud import get_baud, set_baud
 
 READ_BYTES = 256
 """What one look takes of a client that stays."""
 
+_PTY_BYTES = 1 << 17
+"""More than a pty holds."""
+
+_IN_FLIGHT_MS = 5
+"""Within this time after the bytes of a write, the kernel has told of it, on a busy machine too."""
+
 _DEFAULT_BAUD = 9600
+_LOCAL_MODES = 3  # its place in the list of termios.tcgetattr
+_ECHO = termios.ECHO | termios.ECHONL
+
+
+class Visit(NamedTuple):
+    """What is known of the clients of one look at the device, who may have come and gone one after the other.
+
+    Attributes:
+        writers: clients of whom the bytes of this look may hold some.
+        counted: whether the one that is there now is among them.
+        left: a client has left, and no other was there.
+        another_came: after that, one has opened the device.
+    """
+
+    writers: int
+    counted: bool
+    left: bool = False
+    another_came: bool = False
+
+    @property
+    def another_wrote(self) -> bool:
+        """Whether a client is there who came when another had left, and has written."""
+        return self.another_came and self.counted
+
+
+def _doubtful_lines(writers: int, data: bytes) -> int:
+    """Return how many lines of `data`, from its first, may be half of one client's and half of another's.
+
+    Nobody can tell where one client's bytes end. When the lines may be one for each client, as those of commands of a
+    shell, a glued one can only be the first of them; otherwise it can be any.
+    """
+    ends = data.count(b"\r")
+    if writers < 2 or not data:
+        return 0
+    return 1 if ends == writers and data.endswith(b"\r") else ends + 1
 
 
 class PtyPort:
@@ -45,6 +88,7 @@ class PtyPort:
         self._warn = warn
         self.link: DeviceLink | None = None
         self._outbox = Outbox()
+        self._said_doubtful = False
         self._open()
 
     def _open(self) -> None:
@@ -61,6 +105,7 @@ class PtyPort:
                 f"this system does not tell who opens {self.name}: a client that leaves in mid-line goes unnoticed"
             )
         self._clients = 0
+        self._unread = False  # whether something may have been written since the device was read empty
         self._client_baud = self._baud
 
     @property
@@ -82,23 +127,33 @@ class PtyPort:
 
     def receive(self) -> Arrival:
         """Return what clients have done since the last call."""
-        left, wrote_since = self._follow_clients()
-        if left and not wrote_since:
-            # All that is there is of the one that left: taken whole, the next one's bytes come apart from it.
-            data = self._read(whole=True)
-            # But another may have come and written while we looked: then it is not the end of this.
-            _, wrote_since = self._follow_clients(left=True)
-            arrival = Arrival(left_before=wrote_since, data=data, left_after=not wrote_since)
-        else:
-            arrival = Arrival(left_before=left, data=self._read())
-        if left:
-            self._let_go()
-        return arrival
+        visit = self._follow_clients(Visit(writers=int(self._unread), counted=self._unread))
+        data = self._read(whole=visit.left)
+        visit = self._follow_clients(visit)  # What they did meanwhile may be in these bytes.
+        if visit.left and self._unread:
+            data += self._read(whole=True)
+            visit = self._follow_clients(visit)
+        if not visit.left:
+            return Arrival(data=data)
+        if data and visit.another_came and not visit.another_wrote:
+            visit = self._wait_for_a_write(visit)
+        self._let_go()
+        doubtful = _doubtful_lines(visit.writers, data)
+        if doubtful and not self._said_doubtful:
+            self._warn(
+                f"two programs used {self.name} one right after the other, and nobody can tell which bytes are whose: "
+                "what may be of both is not carried out"
+            )
+            self._said_doubtful = True
+        if visit.another_wrote:
+            return Arrival(left_before=True, data=data, doubtful_lines=doubtful)
+        return Arrival(data=data, left_after=True, doubtful_lines=doubtful)
 
     def send(self, data: bytes) -> None:
         """Give replies to the client; they are lost when nobody has the port open, or nobody reads it."""
         if self._is_away or (self._watch is not None and self._clients == 0):
             return
+        self._end_echo()
         was_dropping = bool(self._outbox.dropped_bytes)
         self._outbox.put(self._as_heard(data, self._baud, self._client_baud))
         self.flush()
@@ -136,29 +191,58 @@ class PtyPort:
 
     def _read(self, whole: bool = False) -> bytes:
         """Return bytes as the table hears them: all that are there, or no more than `READ_BYTES`."""
+        self._end_echo()
         self._notice_rate()
         data = bytearray()
-        with suppress(BlockingIOError):
-            data += os.read(self._server, READ_BYTES)
-            while whole:
-                data += os.read(self._server, READ_BYTES)
+        limit = _PTY_BYTES if whole else READ_BYTES
+        self._unread = True
+        try:
+            while len(data) < limit:
+                data += os.read(self._server, min(READ_BYTES, limit - len(data)))
+        except BlockingIOError:
+            self._unread = False
         return self._as_heard(bytes(data), self._client_baud, self._baud)
 
-    def _follow_clients(self, left: bool = False) -> tuple[bool, bool]:
-        """Return whether the last client left since the last call, and whether another wrote after that."""
-        wrote_since = False
+    def _follow_clients(self, visit: Visit) -> Visit:
+        """Return what was known of a visit with what clients have done since."""
+        writers, counted, left, another_came = visit
         for event in self._watch.events() if self._watch is not None else ():
             if event == OPENED:
                 self._clients += 1
+                another_came = left
                 if self._clients == 2:
                     self._warn(f"two programs have {self.name} open: each takes some of the other's replies")
             elif event == CLOSED:
                 self._clients = max(0, self._clients - 1)
                 if self._clients == 0:
-                    left, wrote_since = True, False
+                    counted, left, another_came = False, True, False
             elif event == WRITTEN:
-                wrote_since = left
-        return left, wrote_since
+                self._unread = True
+                writers += not counted
+                counted = True
+        return Visit(writers, counted, left, another_came)
+
+    def _wait_for_a_write(self, visit: Visit) -> Visit:
+        """Return the visit with a write of the one that came, if its bytes are read already.
+
+        The kernel tells of a write only after its bytes are there.
+        """
+        for _ in range(_IN_FLIGHT_MS):
+            time.sleep(0.001)
+            later = self._follow_clients(visit)
+            if later != visit:
+                readable, _ = wait_for([self._server], [], 0.0)
+                return visit if readable else later
+        return visit
+
+    def _end_echo(self) -> None:
+        """Switch off the echo that a client has switched on: the table would answer its own replies for ever."""
+        settings = termios.tcgetattr(self._server)
+        if settings[_LOCAL_MODES] & _ECHO:
+            settings = termios.tcgetattr(self._device)
+            settings[_LOCAL_MODES] &= ~_ECHO
+            termios.tcsetattr(self._device, termios.TCSANOW, settings)
+            self._warn(f"a program switched the echo of {self.name} on (stty sane does so): it is switched off again")
 
     def _let_go(self) -> None:
         """Forget a client that has left, and leave the device to the next one as the first one found it."""

@@ -4,14 +4,15 @@ The table is advanced lazily: when a client or a signal calls, when a byte on th
 so that there is never much to catch up with.
 """
 
-import select
+from collections import deque
 from collections.abc import Callable, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING
 
 from emulator.clock import Clock
 from emulator.faults import Fault
-from emulator.port import Port
+from emulator.port import Arrival, Port, spoiled
+from emulator.readiness import wait_for
 from emulator.signals import SignalWatch
 from emulator.status import TableStatus
 from emulator.table import Table
@@ -27,6 +28,8 @@ _GIVE_UP_S = 0.5
 """How far simulated time may be behind the clock before the clock is held back."""
 _LINE_BUFFER_BYTES = 256
 """What waits for a slow line, in the driver of a real one; a client that sends more is made to wait."""
+_MOST_ARRIVALS = 64
+"""Looks at clients whose bytes wait until the line has carried those of one that has left."""
 _LAST_FRACTION = 1.0 - 2.0**-20
 """The latest that an edge can be in a tick."""
 _TRIGGER_SIGNAL = "SIGUSR1"
@@ -65,6 +68,7 @@ class Server:
         self._running = True
         self._said_slow = False
         self._said_two = False
+        self._arrivals: deque[Arrival] = deque()
         self._leaving = False
         self._hung_up = False
 
@@ -80,7 +84,9 @@ class Server:
                 if not writable.isdisjoint(port.output_descriptors):
                     port.flush()
                 if not readable.isdisjoint(port.input_descriptors):
-                    self._serve_port(port)
+                    self._arrivals.append(port.receive())
+                    self._warn_of_two()
+            self._serve_arrivals()
             if self._control and not readable.isdisjoint(self._control.input_descriptors):
                 self._control.serve(self)
             if self._signals.descriptor in readable:
@@ -143,15 +149,14 @@ class Server:
         if not self._line_is_full():
             inputs += chain.from_iterable(port.input_descriptors for port in self._ports)
         outputs = list(chain.from_iterable(port.output_descriptors for port in self._ports))
-        # Unlike epoll, which counts in milliseconds, select wakes in time for the next byte.
-        readable, writable, _ = select.select(inputs, outputs, [], self._sleep_s())
-        return set(readable), set(writable)
+        return wait_for(inputs, outputs, self._sleep_s())
 
     def _line_is_full(self) -> bool:
-        """Return whether clients must wait: for the bytes of one that has left, or as behind any slow line."""
+        """Return whether clients must wait, as behind any slow line."""
         if self._table.ticks_until_byte() is None:
             return False
-        return self._leaving or self._table.status().received_queue >= _LINE_BUFFER_BYTES
+        waiting = self._table.status().received_queue + sum(len(arrival.data) for arrival in self._arrivals)
+        return waiting >= _LINE_BUFFER_BYTES or len(self._arrivals) >= _MOST_ARRIVALS
 
     def _sleep_s(self) -> float:
         ticks = self._table.ticks_until_byte()
@@ -160,22 +165,25 @@ class Server:
         return min(_LONGEST_SLEEP_S, self._clock.wall_s_until(self._table.tick + ticks))
 
     def _catch_up(self) -> None:
-        """Bring the table level with the clock, or the clock with the table when that takes too long."""
+        """Bring the table level with the clock, or the clock with the table when that is too far ahead."""
         end_s = self._clock.wall_s() + _CATCH_UP_S
         while (behind := int(self._clock.now_ticks()) - self._table.tick) > 0:
+            if behind > _GIVE_UP_S * self._clock.ticks_per_wall_s:
+                self._hold_the_clock_back(behind)
+                return
             if self._clock.wall_s() > end_s:
-                self._give_up_when_far(behind)
                 return
             self._table.advance(min(behind, _CATCH_UP_TICKS))
             self._send_replies()
 
-    def _give_up_when_far(self, behind: int) -> None:
-        if behind < _GIVE_UP_S * self._clock.ticks_per_wall_s:
-            return
+    def _hold_the_clock_back(self, behind: int) -> None:
+        """Leave out the time for which the process was stopped, or the machine too slow."""
         self._clock.set_ticks(self._table.tick)
         if not self._said_slow:
             self._warn(
-                f"simulated time falls behind: this machine is busy, or too slow for time scale {self.time_scale:g}"
+                f"simulated time falls behind, by {behind / self._clock.ticks_per_wall_s:.1f} s of the clock, which "
+                "are left out: the process was stopped, or this machine is busy, or too slow for time scale "
+                f"{self.time_scale:g}"
             )
             self._said_slow = True
 
@@ -188,16 +196,18 @@ class Server:
             else:
                 port.come_back()
 
-    def _serve_port(self, port: Port) -> None:
-        arrival = port.receive()
-        self._warn_of_two()
-        if arrival.left_before:
-            self._table.disconnect()
-        if arrival.data:
-            self._table.receive(arrival.data)
-            self._send_replies()
-        if arrival.left_after:
-            self._leaving = True
+    def _serve_arrivals(self) -> None:
+        """Give the table what clients have sent; what came after one that has left waits for the end of that."""
+        while self._arrivals and not self._leaving:
+            arrival = self._arrivals.popleft()
+            if arrival.left_before:
+                self._table.disconnect()
+            if arrival.data:
+                self._table.receive(spoiled(arrival.data, arrival.doubtful_lines))
+                self._send_replies()
+            if arrival.left_after:
+                self._leaving = True
+                self._let_go()
 
     def _warn_of_two(self) -> None:
         busy = [port.name for port in self._ports if port.client_count]

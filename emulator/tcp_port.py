@@ -5,6 +5,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from emulator.outbox import Outbox
+from emulator.parameter import brief
 from emulator.port import Arrival
 
 LOOPBACK = "127.0.0.1"
@@ -22,8 +23,9 @@ def parse_address(text: str) -> tuple[str, int]:
     """
     host, _, port = text.rpartition(":")
     bare = host[1:-1] if host.startswith("[") and host.endswith("]") else host
-    if not (port.isascii() and port.isdigit() and int(port) <= 65535) or (":" in bare and bare == host):
-        raise ValueError(f"'{text}' is not [HOST:]PORT with a port from 0 (any free one) to 65535")
+    is_port = port.isascii() and port.isdigit() and len(port) <= 5 and int(port) <= 65535
+    if not is_port or (":" in bare and bare == host):
+        raise ValueError(f"{brief(text)} is not [HOST:]PORT with a port from 0 (any free one) to 65535")
     return bare or LOOPBACK, int(port)
 
 

@@ -54,7 +54,7 @@ def test_the_count_can_be_set(wall: Wall) -> None:
     assert clock.now_ticks() == 12.0
 
 
-@pytest.mark.parametrize("time_scale", [0.0, -1.0, float("inf"), float("nan")])
-def test_a_time_scale_that_is_not_positive_is_refused(wall: Wall, time_scale: float) -> None:
-    with pytest.raises(ValueError, match="greater than 0"):
+@pytest.mark.parametrize("time_scale", [0.0, -1.0, 1e-4, 1e7, 1e306, float("inf"), float("nan")])
+def test_a_time_scale_that_no_clock_can_keep_is_refused(wall: Wall, time_scale: float) -> None:
+    with pytest.raises(ValueError, match=r"a number from 0\.001"):
         Clock(tick_hz=1000, wall_s=wall).set_time_scale(time_scale)

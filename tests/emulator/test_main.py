@@ -141,30 +141,32 @@ def test_a_script_that_reads_one_line_and_no_more_does_not_stop_it() -> None:
     assert process.wait(10) == 0
 
 
-def test_a_trace_for_which_there_is_no_room_is_said_and_leaves_no_half_file(tmp_path: Path) -> None:
-    (tmp_path / "run.csv.part").symlink_to("/dev/full")
-    process = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "emulator",
-            "--pty",
-            "--trace",
-            str(tmp_path / "run.csv"),
-            "--link",
-            str(tmp_path / "table"),
-        ],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+def test_a_trace_for_which_there_is_no_room_is_said_and_what_was_written_stays(tmp_path: Path) -> None:
+    arguments = ["--pty", "--trace", str(tmp_path / "run.csv"), "--link", str(tmp_path / "table")]
+    limited = f"ulimit -f 1; exec {sys.executable} -m emulator {' '.join(arguments)}"
+    process = subprocess.Popen(["sh", "-c", limited], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
-    process.stdout.readline()
-    process.terminate()
-    _, stderr = process.communicate(timeout=10)
+    with open_port(process.stdout.readline().strip()) as port:
+        ask(port, b"P 10")
+        _, stderr = process.communicate(timeout=10)  # the limit ends it
     assert process.returncode == 2
-    assert "No space left" in stderr.splitlines()[-1]
+    assert stderr.splitlines()[-1].endswith(f"what was written until then is in {tmp_path / 'run.csv.part'}, as CSV")
     assert [path.name for path in tmp_path.iterdir()] == ["run.csv.part"]
+    assert len((tmp_path / "run.csv.part").read_bytes()) in {512, 1024}  # the unit of `ulimit -f`
+
+
+def test_a_second_emulator_with_the_same_files_is_refused_and_the_first_goes_on(
+    stand_in: Start, tmp_path: Path
+) -> None:
+    link, trace = tmp_path / "table", tmp_path / "run.csv"
+    table = stand_in("--pty", "--link", str(link), "--trace", str(trace))
+    assert "another emulator" in refusal("--pty", "--link", str(link))
+    assert "another emulator" in refusal("--pty", "--trace", str(trace))
+    with open_port(str(link)) as port:
+        assert ask(port, b"H") == b"H 0.0\r"
+    table.process.terminate()
+    table.process.wait(10)
+    assert b"".join(read_trace(trace).received) == b"H\r"
 
 
 def test_a_link_path_that_is_an_ordinary_file_is_refused(tmp_path: Path) -> None:

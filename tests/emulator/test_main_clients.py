@@ -4,9 +4,11 @@ import shutil
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
+from emulator import control_client
 from tests.emulator.served import Start, WaitUntil, ask, open_port, wait_for_position
 
 pytestmark = [
@@ -78,9 +80,11 @@ def test_socat_talks_to_the_table(stand_in: Start, line_end: bytes) -> None:
     assert done.stdout == b"H 0.0\rL 0.0\r"
 
 
-def test_the_shell_is_client_enough(stand_in: Start, wait_until: WaitUntil) -> None:
-    """Each printf opens, writes and goes before the line has carried its bytes: they arrive all the same."""
-    table = stand_in("--pty", "--time-scale", "20")
-    subprocess.run(["sh", "-c", f"printf 'S 40\\r' > {table.port}; printf 'P 20\\r' > {table.port}"], check=True)
+def test_the_shell_is_client_enough(stand_in: Start, tmp_path: Path, wait_until: WaitUntil) -> None:
+    """It opens, writes and goes before the line has carried its bytes: they arrive all the same."""
+    control = tmp_path / "control"
+    table = stand_in("--pty", "--time-scale", "20", "--control", str(control))
+    subprocess.run(["sh", "-c", f"{{ printf 'S 40\\r'; printf 'P 20\\r'; }} > {table.port}"], check=True)
+    wait_until(lambda: control_client.request(control, "state")["reference_deg"] > 0.0)
     with open_port(table.port) as port:
         wait_for_position(port, b"H 20.0\r", wait_until)

@@ -40,6 +40,31 @@ def test_a_half_line_is_not_glued_to_the_next_clients_first(stand_in: Start) -> 
         assert ask(port, b"H") == b"H 0.0\r"
 
 
+@pytest.mark.parametrize("baud", ["0", "9600"])
+def test_half_a_command_is_never_finished_by_the_next_client_however_fast_it_comes(
+    stand_in: Start, tmp_path: Path, baud: str
+) -> None:
+    control = tmp_path / "control"
+    table = stand_in("--pty", "--baud", baud, "--control", str(control))
+    chance = random.Random(int(baud))  # noqa: S311  # a test's draw
+    for _ in range(60):
+        first, second = chance.choice([(b"R 9", b"0\r"), (b"H\rR 9", b"0\rH\r"), (b"R", b" 90\r"), (b"P 9", b"0\r\r")])
+        for data in (first, second):
+            client = os.open(table.port, os.O_RDWR | os.O_NOCTTY)
+            os.write(client, data)
+            if data is first:
+                time.sleep(chance.choice([0.0, 0.0, 0.0, 1e-5, 1e-4, 1e-3]))
+                os.close(client)
+                time.sleep(chance.choice([0.0, 0.0, 0.0, 1e-5, 1e-4, 1e-3]))
+        reply = b""
+        while b"ERR " not in reply or not reply.endswith(b"\r"):
+            assert select.select([client], [], [], 10.0)[0]
+            reply += os.read(client, 64)
+        os.close(client)
+        state = control_client.request(control, "state")
+        assert (state["reference_deg"], state["state"]) == (0.0, "idle"), (first, second)
+
+
 def test_a_client_may_come_and_go_many_times(stand_in: Start) -> None:
     table = stand_in("--pty", "--baud", "0")
     for _ in range(50):
@@ -103,6 +128,23 @@ def test_a_client_that_floods_a_slow_line_is_made_to_wait_and_the_next_one_is_no
     time.sleep(0.1)
     with open_port(table.port) as port:
         assert ask(port, b"H") == b"H 0.0\r"
+
+
+def test_a_terminal_that_echoes_does_not_make_the_table_answer_itself(stand_in: Start, tmp_path: Path) -> None:
+    control = tmp_path / "control"
+    table = stand_in("--pty", "--control", str(control))
+    with open_port(table.port) as port:
+        subprocess.run(["stty", "-F", table.port, "sane"], check=True)
+        port.write(b"Q\r")
+        table.wait_for_words("echo")
+        time.sleep(0.5)
+        subprocess.run(["stty", "-F", table.port, "raw", "-echo"], check=True)
+        time.sleep(0.2)
+        before = port.in_waiting
+        time.sleep(0.2)
+        assert port.in_waiting == before
+    state = control_client.request(control, "state")
+    assert (state["received_queue"], state["transmit_queue"]) == (0, 0)
 
 
 def test_a_wrong_rate_is_garbage_and_stderr_says_why(stand_in: Start) -> None:

@@ -5,13 +5,14 @@ import sys
 import termios
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 import serial
 
 from emulator.device_link import DeviceLink
 from emulator.outbox import LIMIT_BYTES
-from emulator.port import Arrival
+from emulator.port import Arrival, spoiled
 from emulator.pty_port import READ_BYTES, PtyPort
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what is known about ptys was measured on Linux")
@@ -84,16 +85,113 @@ def test_what_the_next_client_sends_comes_after_the_first_one_left(port: PtyPort
     assert port.receive() == Arrival(left_before=True, data=b"0\r")
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "doubtful"),
+    [
+        (b"R 9", b"0\r", 2),
+        (b"R 9", b"0\rH\r", 1),
+        (b"R 9", b"0\rH\rH\r", 4),
+        (b"H\rR 9", b"0\rH\r", 4),
+        (b"R 9\r", b"H\r", 1),
+        (b"R 9", b"0", 1),
+        (b"S 20\rR 9", b"0", 2),
+    ],
+)
+def test_of_bytes_of_two_clients_that_are_found_in_one_look_the_lines_that_may_be_glued_are_told(
+    port: PtyPort, opened: Open, first: bytes, second: bytes, doubtful: int
+) -> None:
+    client = opened(port.name)
+    os.write(client, first)
+    os.close(client)
+    os.write(opened(port.name), second)
+    assert port.receive() == Arrival(left_before=True, data=first + second, doubtful_lines=doubtful)
+
+
+def test_bytes_that_came_after_the_last_look_may_be_of_a_client_that_left_then(port: PtyPort, opened: Open) -> None:
+    client = opened(port.name)
+    os.write(client, b"H\r" * READ_BYTES + b"R 9")  # more than a look takes
+    port.receive()
+    os.close(client)
+    os.write(opened(port.name), b"0\r")
+    arrival = port.receive()
+    assert arrival.data.endswith(b"R 90\r")
+    assert arrival.doubtful_lines > arrival.data.count(b"\r")
+
+
+@pytest.mark.parametrize(
+    ("pieces", "doubtful"),
+    [
+        ([b"S 20\r", b"R 90\r"], 1),
+        ([b"R 9", b"0\r"], 2),
+        ([b"R 9", b"0"], 1),
+        ([b"R 9", b"0\r", b"H\r"], 3),
+        ([b"R 9"], 0),
+    ],
+)
+def test_the_same_holds_for_clients_that_came_and_went(
+    port: PtyPort, opened: Open, pieces: list[bytes], doubtful: int
+) -> None:
+    for piece in pieces:
+        client = opened(port.name)
+        os.write(client, piece)
+        os.close(client)
+    assert port.receive() == Arrival(data=b"".join(pieces), left_after=True, doubtful_lines=doubtful)
+
+
+@pytest.mark.parametrize("modes", [termios.ECHO, termios.ECHONL | termios.ICANON, termios.ECHO | termios.ICANON])
+def test_an_echo_that_a_client_switches_on_is_switched_off_again(
+    port: PtyPort, opened: Open, warnings: list[str], modes: int
+) -> None:
+    client = opened(port.name)
+    settings = termios.tcgetattr(client)
+    settings[0] |= termios.ICRNL
+    settings[3] |= modes
+    termios.tcsetattr(client, termios.TCSANOW, settings)
+    port.receive()
+    for _ in range(3):
+        port.send(b"H 0.0\r\n")
+        assert port.receive() == Arrival()
+    assert not termios.tcgetattr(client)[3] & (termios.ECHO | termios.ECHONL)
+    assert [sentence for sentence in warnings if "echo" in sentence] == warnings
+    assert len(warnings) == 1
+
+
+class Slow(PtyPort):
+    """A port where a client leaves, and another comes and writes, between the look at clients and that at bytes."""
+
+    deeds: ClassVar[list[Callable[[], object]]] = []
+
+    def _read(self, whole: bool = False) -> bytes:
+        while self.deeds:
+            self.deeds.pop(0)()
+        return super()._read(whole)
+
+
+def test_a_client_that_leaves_while_bytes_are_read_is_not_glued_to_the_next(warnings: list[str], opened: Open) -> None:
+    port = Slow(9600, warnings.append)
+    client = opened(port.name)
+    os.write(client, b"R 9")
+    port.deeds[:] = [lambda: os.close(client), lambda: os.write(opened(port.name), b"0\r")]
+    assert port.receive() == Arrival(left_before=True, data=b"R 90\r", doubtful_lines=2)
+    port.close()
+
+
 class Overtaken(PtyPort):
     """A port whose next client writes just when the bytes of the last one are looked at."""
 
     next_client = -1
 
     def _read(self, whole: bool = False) -> bytes:
-        if whole:
+        if whole and self.next_client < 0:
             self.next_client = os.open(self.name, os.O_RDWR | os.O_NOCTTY)
             os.write(self.next_client, b"H\r")
         return super()._read(whole)
+
+
+def test_doubtful_lines_are_refused_and_the_others_are_not() -> None:
+    assert spoiled(b"R 90\rH\r", 0) == b"R 90\rH\r"
+    assert spoiled(b"R 90\rH\r", 1) == b"\x18R 90\rH\r"
+    assert spoiled(b"S 20\r\rR 9", 3) == b"\x18S 20\r\r\x18R 9"
 
 
 def test_a_client_that_writes_while_another_leaves_is_not_taken_for_it(warnings: list[str], opened: Open) -> None:
