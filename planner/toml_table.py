@@ -33,7 +33,7 @@ class TomlTable:
             return cls(file, tomllib.loads(file.read_text(encoding="utf-8")))
         except OSError as error:
             raise ScanFileError(f"{file}: cannot be read ({error.strerror or error})") from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        except (ValueError, RecursionError) as error:  # tomllib passes on that an integer is too long
             raise ScanFileError(f"{file}: not a TOML file: {error}") from error
 
     def __contains__(self, key: str) -> bool:

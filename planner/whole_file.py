@@ -1,6 +1,7 @@
-"""Write a file so that it appears when it is whole, or not at all."""
+"""A file that others may wait for: it appears when it is whole, or not at all."""
 
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,8 +9,12 @@ from pathlib import Path
 
 @contextmanager
 def whole_file(file: Path) -> Iterator[Path]:
-    """Give the path of a partial file to write; it is renamed to `file` in the end, or removed on any exception."""
-    partial = file.with_name(f".{file.stem}.{os.getpid()}.partial{file.suffix}")
+    """Give the path of a partial file to write; it is renamed to `file` in the end, or removed on any exception.
+
+    The partial file is created here, exclusively: no other program writes it, and no symbolic link is followed.
+    """
+    partial = file.with_name(f".{file.stem}.{secrets.token_hex(4)}.partial{file.suffix}")
+    os.close(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
     try:
         yield partial
         partial.replace(file)

@@ -131,7 +131,7 @@ def _rows_of_csv(file: Path, text: str) -> list[list[float]]:
 def _rows_of_json(file: Path, text: str) -> list[list[float]]:
     try:
         poses = json.loads(text)
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:  # json passes on that an integer is too long
         raise PathError(f"{file}: not a JSON file: {error}") from error
     if not isinstance(poses, list):
         raise PathError(f"{file}: must hold a list of poses")

@@ -158,7 +158,7 @@ def load_run(folder: Path) -> StoredRun:
         raise RunFileError(
             f"{folder}: holds no run ({error.strerror or error}); python -m planner run writes one"
         ) from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise RunFileError(f"{folder}: its run is damaged: {type(error).__name__}, {error}") from error
     run_input = load_run_input(folder / PLAN_FILE).turned(conditions.turns)
     motion = TableMotion(run_input.plan, run_input.problem.limits, conditions.pause_times)

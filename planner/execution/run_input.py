@@ -77,7 +77,7 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
                 f" plan anew with python -m planner plan {name} --out {plan_file.parent}"
             )
         planned_arm = PlannedArm.read(document)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise RunInputError(f"{plan_file}: is damaged: {type(error).__name__}, {error}") from error
     except (ArmTableError, PoseError) as error:
         raise RunInputError(f"{plan_file}: is damaged: {error}") from error

@@ -99,7 +99,7 @@ def load_plan(file: Path) -> Plan:
         )
     except OSError as error:
         raise PlanFileError(f"{file}: cannot be read ({error.strerror or error})") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise PlanFileError(f"{file}: holds no plan that this program has written") from error
     if not len(plan.angles_deg) == len(plan.speeds_deg_s) == len(plan.accelerations_deg_s2) + 1:
         raise PlanFileError(f"{file}: is damaged: angles, speeds and accelerations do not belong together")

@@ -26,6 +26,8 @@ def tell(text: str) -> None:
     """Print a result. When nobody reads results any more the work goes on: its files hold them all."""
     if sys.stdout is None:
         return
+    encoding = sys.stdout.encoding or "utf-8"
+    text = text.encode(encoding, "backslashreplace").decode(encoding)  # the name of a device may hold any byte
     try:
         sys.stdout.write(f"{text}\n")
         sys.stdout.flush()

@@ -22,6 +22,8 @@ FORMAT = "seventh-axis conformance record"
 VERSION = 1
 
 _WAYS: tuple[Literal["sent", "received", "beside"], ...] = ("sent", "received", "beside")
+_UNWRITABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
+"""What UTF-8 or XML cannot hold; the name of a device can, as any byte that is not a zero or a slash may be in it."""
 _DEED = re.compile(rb"reopen|trigger|power_cycle|preset -?[0-9]{1,10}")
 
 
@@ -102,7 +104,7 @@ def read_record(path: Path) -> Record:
     """
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise RecordError(f"{path}: cannot be read: {error}") from error
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         raise RecordError(f"{path}: is no {FORMAT}")
@@ -149,14 +151,16 @@ def write_junit(path: Path, header: Header, outcomes: Sequence[Outcome]) -> None
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a file under a temporary name and give it its own when it is whole.
+    """Write a file under a temporary name and give it its own when it is whole; unwritable characters are escaped.
 
     Raises:
         OSError: it cannot be written; nothing is left of it.
     """
     partial = path.with_name(path.name + ".part")
     try:
-        partial.write_text(text, encoding="utf-8")
+        partial.unlink(missing_ok=True)  # of a run that was killed
+        with partial.open("x", encoding="utf-8") as file:
+            file.write(_UNWRITABLE.sub(_escaped, text))
         partial.replace(path)
     except OSError as error:
         with suppress(OSError):
@@ -221,6 +225,10 @@ def _motion(motion: MotionRecord) -> Mapping[str, Any]:
         "expected": [expectation(one) for one in motion.expectations],
         "samples": [sample(one) for one in motion.samples],
     }
+
+
+def _escaped(match: re.Match[str]) -> str:
+    return match.group().encode("unicode_escape", "surrogatepass").decode("ascii")
 
 
 def _xml_text(text: str) -> str:

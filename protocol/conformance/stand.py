@@ -123,10 +123,11 @@ class ControlChannel:
                 connection.sendall(request)
                 with connection.makefile("rb") as lines:
                     answer = json.loads(lines.readline() or b'{"ok": false, "error": "hung up"}')
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise StandError(f"{self._path}: {error}; is this the --control socket of a running stand-in?") from error
-        if not answer["ok"]:
-            raise StandError(f"{self._path}: {command}: {answer['error']}")
+        if not isinstance(answer, dict) or answer.get("ok") is not True:
+            reason = answer.get("error") if isinstance(answer, dict) else "this is no answer of a stand-in"
+            raise StandError(f"{self._path}: {command}: {reason}")
 
 
 class Programs(WireOnly):

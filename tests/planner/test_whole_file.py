@@ -1,3 +1,4 @@
+import secrets
 from pathlib import Path
 
 import pytest
@@ -28,3 +29,15 @@ def test_an_interrupted_file_leaves_what_was_there_and_nothing_else(tmp_path: Pa
     with pytest.raises(KeyboardInterrupt):
         write_half()
     assert [file.read_text() for file in tmp_path.iterdir()] == ["before"]
+
+
+def test_a_link_in_the_place_of_the_partial_file_is_not_followed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(secrets, "token_hex", lambda _size: "guessed")
+    (tmp_path / "thesis.tex").write_text("three years of work")
+    (tmp_path / ".a.guessed.partial.txt").symlink_to(tmp_path / "thesis.tex")
+    with pytest.raises(FileExistsError):
+        write_whole(tmp_path / "a.txt", "x")
+    assert (tmp_path / "thesis.tex").read_text() == "three years of work"
+    assert not (tmp_path / "a.txt").exists()

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.whole_file import whole_file
 from tools.emulated import Array
 
 BITS_A_BYTE = 10
@@ -71,15 +72,13 @@ def write_recording(path: Path, recording: WireRecording) -> None:
     rows = [(sent.time_s, f"{sent.verb} {sent.value}", "", sent.reply_s) for sent in recording.commands]
     readings = zip(recording.time_s, recording.position_deg, recording.reply_s, strict=True)
     rows += [(float(time_s), "H", str(angle_deg), float(reply_s)) for time_s, angle_deg, reply_s in readings]
-    partial = path.with_name(path.name + ".part")
-    with partial.open("w", encoding="ascii", newline="") as file:
+    with whole_file(path) as partial, partial.open("w", encoding="ascii", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow((*COLUMNS, _REPLY))
         writer.writerows(
             (f"{time_s:.6f}", command, angle, f"{reply_s:.6f}")
             for time_s, command, angle, reply_s in sorted(rows, key=lambda row: row[0])
         )
-    partial.replace(path)
 
 
 def read_recording(path: Path) -> WireRecording | DriveRecording:

@@ -1,14 +1,16 @@
 """The report: what a device sends is shown and never obeyed, and every mark lies within its picture."""
 
 import dataclasses
+import json
 import re
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pytest
 
 from protocol.conformance.catalogue import chosen_cases
 from protocol.conformance.profile import load_profile
-from protocol.conformance.record import Header
+from protocol.conformance.record import Header, write_junit, write_record
 from protocol.conformance.report import write_report
 from protocol.conformance.suite import Outcome
 from protocol.conformance.svg_plot import range_bar
@@ -44,3 +46,18 @@ def test_the_mark_of_a_measurement_lies_within_its_bar(value: float) -> None:
     width = float(re.findall(r'viewBox="0 0 (\d+) 12"', bar)[0])
     middle, radius = (float(re.findall(rf'{name}="([0-9.]+)"', bar)[0]) for name in ("cx", " r"))
     assert radius <= middle <= width - radius
+
+
+@pytest.mark.parametrize("name", ["/dev/tty\udcff", "/dev/tty\x01", "/dev/tty\x7f\x1b[31m\udc80", "/dev/\ufffe\uffff"])
+def test_any_name_of_a_device_costs_no_record_and_no_report(tmp_path: Path, name: str) -> None:
+    (case, *_) = chosen_cases(["5.2/1"])
+    outcome = Outcome(case, Verdict.FAIL, f"{name}: no answer", wire=(Event(0.0, "sent", b"H\r"),))
+    header = Header(name, load_profile(), 0, 0, [], None)
+    write_report(tmp_path / "report.html", header, [outcome], lambda _case: f"--port {name}")
+    write_record(tmp_path / "record.json", header, [outcome])
+    write_junit(tmp_path / "junit.xml", header, [outcome])
+    suite = ET.parse(tmp_path / "junit.xml").getroot()[0]  # noqa: S314  # our own
+    assert suite.attrib["name"].startswith("conformance of /dev/")
+    assert (suite.attrib["failures"], len(suite)) == ("1", 1)
+    assert "/dev/" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert json.loads((tmp_path / "record.json").read_text(encoding="utf-8"))["device"] == name
