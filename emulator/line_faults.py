@@ -21,6 +21,11 @@ class LineFaults:
         self._held: deque[tuple[int, bytes]] = deque()  # each with the tick at which it goes on
 
     @property
+    def are_present(self) -> bool:
+        """Whether any fault holds or is to come."""
+        return self._faults.present
+
+    @property
     def held_until(self) -> int | None:
         """The tick at which replies that are held back go on; None where there are none."""
         return self._held[0][0] if self._held else None

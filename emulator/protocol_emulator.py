@@ -14,7 +14,8 @@ import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException, SerialTimeoutException
 
 from emulator.config import TableConfig, load_config
-from emulator.framing import read_at_rate
+from emulator.fast_ticks import FastTicks
+from emulator.framing import rates_agree, read_at_rate
 from emulator.table import Table
 
 if TYPE_CHECKING:
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 
 OUTPUT_BYTES: Final = 4096
 """What a write leaves to wait for the line, as the driver of a real port does, before it waits itself."""
+
+RUN: Final = FastTicks()
+"""What passes the time of all tables of this process: compiled, once that pays."""
 
 _URL = "emulator://[?config=PATH&seed=N&baud=N&decimals=N&strict=0|1&trigger_hz=F]"
 _OPTIONS = ("config", "seed", "baud", "decimals", "strict", "trigger_hz")
@@ -94,7 +98,7 @@ class Serial(SerialBase):
     def out_waiting(self) -> int:
         """Bytes that have not reached the table."""
         self._require_open()
-        return self.table.status().received_queue
+        return self.table.received_queue
 
     def read(self, size: int = 1) -> bytes:
         """Return `size` bytes, or fewer when the time-out passes first.
@@ -106,7 +110,7 @@ class Serial(SerialBase):
         if self.timeout == 0 and not self._received:
             self.advance(1)
         deadline = self._deadline(self.timeout)
-        while len(self._received) < size and self._advance_to_byte(deadline):
+        while (missing := size - len(self._received)) > 0 and self._advance_to_bytes(missing, deadline):
             pass
         if not self._received:
             self._require_line()
@@ -118,8 +122,11 @@ class Serial(SerialBase):
         deadline = self._deadline(self.timeout)
         line = bytearray()
         while not line.endswith(expected) and (size is None or len(line) < size):
-            if not self._received and not self._advance_to_byte(deadline):
-                break
+            if not self._received:
+                wanted = self.table.outgoing.find(expected[-1:]) + 1 or len(self.table.outgoing) + 1
+                wanted = wanted if size is None else min(wanted, size - len(line))
+                if not self._advance_to_bytes(wanted, deadline):
+                    break
             line += self._take(1)
         return bytes(line)
 
@@ -134,7 +141,7 @@ class Serial(SerialBase):
         unsent = self._at_rate(data, self.baudrate, self.table.config.serial.baud)
         deadline = self._deadline(self.write_timeout)
         while unsent:
-            room = OUTPUT_BYTES - self.table.status().received_queue
+            room = OUTPUT_BYTES - self.table.received_queue
             if room > 0:
                 self.table.receive(unsent[:room])
                 unsent = unsent[room:]
@@ -217,16 +224,24 @@ class Serial(SerialBase):
 
     def _advance_to_byte(self, deadline: int | None) -> bool:
         """Let time pass to the end of the next byte on the line; return False once the deadline has come."""
-        until_byte = self.table.ticks_until_byte()
+        return self._advance(self.table.ticks_until_byte(), deadline)
+
+    def _advance_to_bytes(self, wanted: int, deadline: int | None) -> bool:
+        """Let time pass until `wanted` bytes may have come; return False once the deadline has come."""
+        if not self._is_understood():  # what is read of a byte depends on how many come in one piece
+            return self._advance_to_byte(deadline)
+        return self._advance(self.table.ticks_until_sent(wanted), deadline)
+
+    def _advance(self, ticks: int | None, deadline: int | None) -> bool:
         if deadline is None:
-            if until_byte is None:
+            if ticks is None:
                 raise SerialException(
                     f"{self.port}: without a time-out this read would wait for ever: nothing is coming"
                 )
-            self.advance(until_byte)
+            self.advance(ticks)
             return True
         left = deadline - self.table.tick
-        self.advance(left if until_byte is None else min(left, until_byte))
+        self.advance(left if ticks is None else min(left, ticks))
         return left > 0
 
     def _collect(self) -> None:
@@ -237,6 +252,10 @@ class Serial(SerialBase):
         del self._received[:size]
         return data
 
+    def _is_understood(self) -> bool:
+        baud = self.table.config.serial.baud
+        return not baud or rates_agree(self.baudrate, baud)
+
     def _at_rate(self, data: bytes, sender_baud: int, receiver_baud: int) -> bytes:
         paced = bool(data and self.table.config.serial.baud)
         return read_at_rate(data, sender_baud, receiver_baud) if paced else data
@@ -244,12 +263,15 @@ class Serial(SerialBase):
 
 def _table_of(url: str) -> Table:
     """Return the table that a URL describes."""
-    parts = urlsplit(url)
+    try:
+        parts = urlsplit(url)
+    except ValueError as error:
+        raise SerialException(f"{url}: {error}; the form is {_URL}") from error
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
     if parts.scheme != "emulator" or parts.netloc or parts.path not in {"", "/"} or not set(options) <= set(_OPTIONS):
         raise SerialException(f"{url} is not {_URL}")
     try:
-        table = Table(_config_of(options), seed=int(options.get("seed", "0")))
+        table = Table(_config_of(options), seed=int(options.get("seed", "0")), run=RUN)
         table.trigger_hz = float(options.get("trigger_hz", "0"))
     except ValueError as error:
         raise SerialException(f"{url}: {error}; the form is {_URL}") from error

@@ -14,6 +14,7 @@ from protocol.line_buffer import LineBuffer
 from protocol.messages import LINE_LIMIT, ErrorCode
 
 _LONGEST_REPLY = LINE_LIMIT + 1
+_LINE_END = 0x0D
 
 Answer = Callable[[bytes | ErrorCode], bytes]
 """The firmware: carries out a line, as `LineBuffer` gives it, and returns the reply."""
@@ -61,6 +62,43 @@ class SerialEnd:
         if sent := uart.transmit():
             self._send(sent)
 
+    @property
+    def needs_each_tick(self) -> bool:
+        """Whether something can happen on the line that is not the end of a line."""
+        uart = self.uart
+        if uart.idle:
+            return False
+        return self._faults.are_present or not uart.is_read_at_once or uart.transmit_room < _LONGEST_REPLY
+
+    def ticks_until_line(self) -> int | None:
+        """Return the ticks until the firmware has a whole line; None while none is on its way."""
+        return self.uart.ticks_until_received(_LINE_END)
+
+    def pass_ticks(self, ticks: int, tick: int, answer: Answer) -> None:
+        """Let ticks pass, the last one up to `tick`, as so many calls of `advance` do.
+
+        The line does not need each of them, and no whole line comes before the last one.
+        """
+        if self.uart.idle:
+            return
+        if self.ticks_until_line() == ticks:
+            self._pass_quietly(ticks - 1, tick, answer)
+            self.advance(tick, answer)
+        else:
+            self._pass_quietly(ticks, tick, answer)
+
+    def ticks_until_sent(self, wanted: int, tick: int) -> int | None:
+        """Return the ticks until `wanted` bytes may have left, or a line comes that may bring them; None if none does.
+
+        Every byte is stopped at where faults may change it.
+        """
+        if self.needs_each_tick or self.held_until is not None:
+            return self.ticks_until_byte(tick)
+        if len(self.uart.outgoing) >= wanted:
+            return self.uart.ticks_until_sent(wanted)
+        line = self.ticks_until_line()
+        return self.ticks_until_byte(tick) if line is None else line
+
     def write(self, reply: bytes, tick: int) -> None:
         """Give a reply to the line."""
         self._put(self._faults.on_a_reply(reply, tick))
@@ -94,6 +132,12 @@ class SerialEnd:
         """Return what the firmware has read and what has left since the last call, and forget it."""
         heard, said, self._heard, self._said = self._heard, self._said, b"", b""
         return heard, said
+
+    def _pass_quietly(self, ticks: int, tick: int, answer: Answer) -> None:
+        if data := self.uart.advance_by(ticks):
+            self._read(data, tick, answer)
+        if sent := self.uart.transmit():
+            self._send(sent)
 
     def _read(self, data: bytes, tick: int, answer: Answer) -> None:
         self._heard += data

@@ -10,6 +10,7 @@ from emulator.config import TableConfig
 from emulator.drive_faults import faulty_step, is_faulty
 from emulator.drive_train import DriveState, at_standstill
 from emulator.encoder import angle_within_tick, count_at, recounted
+from emulator.fast_ticks import Run
 from emulator.fault_schedule import FaultSchedule
 from emulator.faults import Fault
 from emulator.fixed_point import wrap_int32
@@ -52,8 +53,14 @@ class Table:
         observer: who sees every tick, if anybody.
     """
 
-    def __init__(self, config: TableConfig, seed: int = 0) -> None:
-        """Switch the table on, at rest at 0 degrees."""
+    def __init__(self, config: TableConfig, seed: int = 0, run: Run | None = None) -> None:
+        """Switch the table on, at rest at 0 degrees.
+
+        Args:
+            config: the table's constants.
+            seed: places shaft and gear teeth.
+            run: passes undisturbed ticks, once the state is asked for. Without it they pass at once, interpreted.
+        """
         chance = random.Random(seed)  # noqa: S311  # where a gear stands is no secret
         tick_hz = config.control.tick_hz
         self.config = config
@@ -62,13 +69,15 @@ class Table:
         self._interpreter = Interpreter(config)
         self._registers = self._interpreter.power_on()
         self._constants = table_constants(config, encoder_phase=chance.random())
+        self._run = run
+        self._owed_ticks = 0  # by which plant and controller are behind
+        self._resting = False  # the state repeats itself, so ticks cost nothing
         self._state = self._woken(at_standstill(self._constants.drive, gap_share=chance.uniform(-1.0, 1.0)))
         self._true_zero_rad = 0.0
         self._load_torque_Nm = 0.0
         self._faults = FaultSchedule(config.faults, tick_hz, seed)
         self._serial = SerialEnd(config, self._faults)
         self._triggers = TriggerInput(tick_hz, self._faults)
-        self._resting = False  # the state repeats itself, so ticks cost nothing
 
     def receive(self, data: bytes) -> None:
         """Take bytes that the client puts on the line now."""
@@ -125,7 +134,8 @@ class Table:
         """Load the table with a torque that resists positive rotation, until it is set anew."""
         if not math.isfinite(torque_Nm):
             raise ValueError(f"a load torque of {torque_Nm} Nm is not finite")
-        self._load_torque_Nm = torque_Nm
+        self._pay()
+        self._load_torque_Nm = float(torque_Nm)
         self._resting = False
 
     def reset(self, count: int = 0) -> None:
@@ -137,6 +147,20 @@ class Table:
         self._registers = self._interpreter.power_on()._replace(latched_count=wrap_int32(count))
         self._state = self._woken(drive)
         self._resting = False
+
+    @property
+    def received_queue(self) -> int:
+        """Bytes on their way to the firmware."""
+        return self._serial.uart.waiting_count
+
+    @property
+    def outgoing(self) -> bytes:
+        """Bytes of replies that have not left yet."""
+        return self._serial.uart.outgoing
+
+    def ticks_until_sent(self, wanted: int) -> int | None:
+        """Return the ticks until `wanted` bytes may have left, or a line comes that may bring them; None if neither."""
+        return self._serial.ticks_until_sent(wanted, self.tick)
 
     def status(self) -> TableStatus:
         """Return what can be seen of the table now."""
@@ -168,6 +192,7 @@ class Table:
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of a table with this configuration."""
+        self._owed_ticks = 0
         (
             self.tick,
             self._constants,
@@ -193,23 +218,47 @@ class Table:
             else:
                 self._advance_undisturbed(event)
         self._serve_faults()
+        if self._run is None:
+            self._pay()
 
     def _is_busy(self) -> bool:
         """Return whether each tick needs a look: at the line, by the observer, or for a drive that is not sound."""
-        return not self._serial.uart.idle or self.observer is not None or is_faulty(self._faults)
+        return self._serial.needs_each_tick or self.observer is not None or is_faulty(self._faults)
 
     def _next_event(self, end: int) -> int:
-        """Return the tick, `end` at the latest, at which an edge comes, or a fault begins, ends or lets a reply go."""
-        events = (self._triggers.next_tick, self._faults.next_tick, self._serial.held_until)
+        """Return the tick, `end` at the latest, at which something comes from outside.
+
+        That is an edge, a whole line, or a fault that begins, ends or lets a reply go.
+        """
+        line = self._serial.ticks_until_line()
+        line_tick = None if line is None else self.tick + line
+        events = (self._triggers.next_tick, self._faults.next_tick, self._serial.held_until, line_tick)
         return min([end, *(tick for tick in events if tick is not None)])
 
     def _advance_undisturbed(self, end: int) -> None:
         """Pass ticks in which nothing comes from outside; a state that repeats itself stays to the end."""
-        if not self._resting:
-            ticks = end - self.tick
-            self._state, self._resting = run_undisturbed(self._constants, self._state, self._load_torque_Nm, ticks)
+        ticks = end - self.tick
+        self._owed_ticks += ticks
         self.tick = end
+        self._serial.pass_ticks(ticks, end, self._answer)
         self._serial.overheard()  # and forgotten: nobody watches
+
+    @property
+    def _state(self) -> TableState:
+        """Plant and controller at the present tick."""
+        self._pay()
+        return self._past_state
+
+    @_state.setter
+    def _state(self, state: TableState) -> None:
+        self._past_state = state
+
+    def _pay(self) -> None:
+        """Let the ticks pass that plant and controller are behind."""
+        ticks, self._owed_ticks = self._owed_ticks, 0
+        if ticks and not self._resting:
+            run = self._run or run_undisturbed
+            self._past_state, self._resting = run(self._constants, self._past_state, self._load_torque_Nm, ticks)
 
     def _advance_watched(self) -> None:
         """Pass one tick in which the line, an edge, a fault or the observer has its turn."""

@@ -41,6 +41,19 @@ class _Wire:
         """Return the ticks until the first byte is over; only while there is one."""
         return max(1, -(-(self._byte_units - self._units) // self._tick_units))
 
+    def ticks_until(self, index: int) -> int:
+        """Return the ticks until the byte at an index of the queue is over."""
+        return max(1, -(-((index + 1) * self._byte_units - self._units) // self._tick_units))
+
+    def advance_by(self, ticks: int) -> list[int]:
+        """Return the bytes that are over when ticks have passed, as so many calls of `advance` do."""
+        over: list[int] = []
+        if self.queue:
+            self._units += ticks * self._tick_units
+            over.extend(self.queue.popleft() for _ in range(min(self._units // self._byte_units, len(self.queue))))
+            self._units = self._units - len(over) * self._byte_units if self.queue else 0
+        return over
+
     def clear(self) -> None:
         """Forget what is on the line."""
         self.queue.clear()
@@ -56,6 +69,7 @@ class Uart:
         self._outgoing = _Wire(baud, tick_hz)
         self._received: deque[int | None] = deque()
         self._sent = bytearray()
+        self._never_overruns = baud <= RECEIVE_LIMIT * 10 * tick_hz  # bytes within a tick
         self.lost_bytes = 0
 
     @property
@@ -111,6 +125,32 @@ class Uart:
         """Return the ticks until the next byte is over, in either direction; None on an idle line."""
         busy = (wire for wire in (self._incoming, self._outgoing) if wire.queue)
         return min((wire.ticks_until_byte() for wire in busy), default=None)
+
+    @property
+    def is_read_at_once(self) -> bool:
+        """Whether the firmware, as long as it has room to write, reads each byte in the tick in which it is over."""
+        return self._never_overruns and not self._received
+
+    @property
+    def outgoing(self) -> bytes:
+        """The bytes that have not left yet, the first one that on the line."""
+        return bytes(self._outgoing.queue)
+
+    def ticks_until_received(self, byte: int | None = None) -> int | None:
+        """Return the ticks until a byte has come in, or else all bytes; None where it is not on the line."""
+        queue = self._incoming.queue
+        if not queue or (byte is not None and byte not in queue):
+            return None
+        return self._incoming.ticks_until(len(queue) - 1 if byte is None else queue.index(byte))
+
+    def ticks_until_sent(self, count: int) -> int:
+        """Return the ticks until so many bytes have left; there are as many."""
+        return self._outgoing.ticks_until(count - 1)
+
+    def advance_by(self, ticks: int) -> bytes:
+        """Let ticks pass on a line that `is_read_at_once`, and return the bytes that have come in: the firmware's."""
+        self._sent += bytes(self._outgoing.advance_by(ticks))
+        return bytes(self._incoming.advance_by(ticks))
 
     def disconnect(self) -> None:
         """Forget what is on the line: the client has gone."""
