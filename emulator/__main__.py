@@ -69,8 +69,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _parse(arguments: list[str] | None) -> argparse.Namespace:
     options = _parser().parse_args(arguments)
-    if not (options.pty or options.tcp):
-        raise UsageError("give --pty, --tcp or both (--help shows all options)")
+    if not (options.pty or options.tcp or options.rfc2217):
+        raise UsageError("give --pty, --tcp, --rfc2217 or several of them (--help shows all options)")
     if options.link and not options.pty:
         raise UsageError("--link names a pty: give --pty with it")
     return options
@@ -88,6 +88,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--pty", action="store_true", help="open a pseudo-terminal and print its device")
     add("--link", metavar="PATH", type=Path, help="a symbolic link to the pseudo-terminal, removed at the end")
     add("--tcp", metavar="[HOST:]PORT", type=_address, help="listen on TCP and print the URL; port 0 is any free one")
+    add("--rfc2217", metavar="[HOST:]PORT", type=_address, help="the same by RFC 2217, which carries the baud rate")
     add("--baud", metavar="N", type=int, help="baud rate of the table (default 9600); 0: bytes take no time")
     add("--time-scale", metavar="X", type=_time_scale, default=1.0, help="simulated seconds in a real one (default 1)")
     add("--decimals", metavar="N", type=int, help="decimals of angles in replies (default 1)")
@@ -159,6 +160,14 @@ def _open_ports(options: argparse.Namespace, config: TableConfig, stack: ExitSta
         host, number = options.tcp
         with _usage(f"--tcp {host}:{number}"):
             port = TcpPort(host, number, _say)
+        stack.callback(port.close)
+        ports.append(port)
+    if options.rfc2217:
+        from emulator.rfc2217_port import Rfc2217Port  # noqa: PLC0415  # rarely asked for, and a start should be quick
+
+        host, number = options.rfc2217
+        with _usage(f"--rfc2217 {host}:{number}"):
+            port = Rfc2217Port(host, number, config.serial.baud, _say)
         stack.callback(port.close)
         ports.append(port)
     return ports

@@ -37,6 +37,11 @@ class Outbox:
                 self._held += piece
             self._at_line_start = piece.endswith(_LINE_END)
 
+    def put_whole(self, data: bytes) -> None:
+        """Queue bytes that make sense only together, and are no line."""
+        if len(self._held) < 2 * LIMIT_BYTES:
+            self._held += data
+
     def flush(self, send: Callable[[bytes], int]) -> None:
         """Hand bytes on until `send`, which returns how many it took, raises BlockingIOError."""
         try:

@@ -1,5 +1,6 @@
 """The table's serial port over TCP, for pyserial's `socket://host:port`."""
 
+import ipaddress
 import socket
 from collections.abc import Callable
 from contextlib import suppress
@@ -41,6 +42,8 @@ class TcpPort:
         OSError: the address cannot be listened on.
     """
 
+    scheme = "socket"
+
     def __init__(self, host: str, port: int, warn: Callable[[str], None]) -> None:
         self._warn = warn
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
@@ -50,7 +53,10 @@ class TcpPort:
         self._outbox = Outbox()
         self._is_away = False
         bound_port = self._listener.getsockname()[1]
-        self.name = f"socket://[{host}]:{bound_port}" if ":" in host else f"socket://{host}:{bound_port}"
+        shown = f"[{host}]" if ":" in host else host
+        self.name = f"{self.scheme}://{shown}:{bound_port}"
+        if not _is_own_computer(self._listener.getsockname()[0]):
+            warn(f"{self.name} is open to other computers: anybody who reaches it may drive the table")
 
     @property
     def client_count(self) -> int:
@@ -79,7 +85,7 @@ class TcpPort:
         if self._client is None:
             return
         was_dropping = bool(self._outbox.dropped_bytes)
-        self._outbox.put(data)
+        self._outbox.put(self._encoded(data))
         self.flush()
         if self._outbox.dropped_bytes and not was_dropping:
             self._warn(f"the client on {self.name} does not read its replies: they are dropped")
@@ -117,7 +123,8 @@ class TcpPort:
             data = b""
         if not data:
             self._hang_up()
-        return Arrival(data=data, left_after=not data)
+            return Arrival(left_after=True)
+        return Arrival(data=self._decoded(data))
 
     def _accept(self) -> None:
         # A client may be gone again before it is accepted.
@@ -128,9 +135,21 @@ class TcpPort:
             elif self._client is None:
                 _prepare(client)
                 self._client = client
+                self._greet()
             else:
                 client.close()
                 self._warn(f"a second client ({host}, port {port}) was turned away: {self.name} serves one at a time")
+
+    def _greet(self) -> None:
+        """Say to a client that has just come what it needs: here nothing."""
+
+    def _decoded(self, data: bytes) -> bytes:
+        """Return bytes as the table hears them."""
+        return data
+
+    def _encoded(self, data: bytes) -> bytes:
+        """Return bytes as the client reads them."""
+        return data
 
     def _hang_up(self) -> None:
         if self._outbox.dropped_bytes:
@@ -139,6 +158,10 @@ class TcpPort:
         if self._client is not None:
             self._client.close()
             self._client = None
+
+
+def _is_own_computer(address: str) -> bool:
+    return ipaddress.ip_address(address.partition("%")[0]).is_loopback
 
 
 def _prepare(client: socket.socket) -> None:
