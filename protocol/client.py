@@ -44,17 +44,18 @@ class TableClient:
 
     @classmethod
     def open(cls, url: str, baud: int = 9600, timeout_s: float = 1.0, decimals: int = 1) -> Self:
-        """Open a device or any URL of pyserial's: `/dev/ttyUSB0`, `socket://localhost:7000`.
+        """Open a device or any URL of pyserial's: `/dev/ttyUSB0`, `rfc2217://localhost:7000`.
 
         Once the package `emulator` is imported, `emulator://` too.
 
         Raises:
             PortError: the port cannot be opened.
         """
-        import serial  # noqa: PLC0415 - the stand-in shares this package and starts without pyserial
+        # Here, since the stand-in shares this package and starts without pyserial.
+        from protocol.serial_port import open_serial_port  # noqa: PLC0415  # see above
 
         try:
-            port = serial.serial_for_url(url, baudrate=baud, timeout=timeout_s, write_timeout=timeout_s)
+            port = open_serial_port(url, baud, timeout_s)
         except (OSError, ValueError) as error:
             raise PortError(
                 f"cannot open {url} at {baud} baud: {error}; check the name, the rights and the table"

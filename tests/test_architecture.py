@@ -42,7 +42,6 @@ EDGE_MODULES = {
 }
 
 PROTOCOL_EDGE = {
-    "protocol/client.py": {"serial"},
     "protocol/clock.py": {"time"},
     "protocol/interrupts.py": {"signal", "threading"},
     "protocol/quiet_start.py": {"os", "signal"},
@@ -59,6 +58,7 @@ PROTOCOL_EDGE = {
     "protocol/conformance/report.py": {"pathlib"},
     "protocol/conformance/stand.py": {"pathlib", "socket"},
     "protocol/conformance/suite_run.py": {"datetime", "os", "pathlib"},
+    "protocol/serial_port.py": {"serial"},
 }
 
 EMULATOR_EDGE = {

@@ -3,6 +3,7 @@
 import serial
 
 from protocol import Clock, Port, PortError, WallClock
+from protocol.serial_port import open_serial_port
 
 # The stand-in's port `emulator://` is found by pyserial wherever the stand-in is installed; nothing of it is used here.
 _STAND_IN = "emulator"
@@ -39,7 +40,7 @@ def open_port(url: str, baud: int, timeout_s: float, time_scale: float = 1.0) ->
     if _STAND_IN not in serial.protocol_handler_packages:
         serial.protocol_handler_packages.append(_STAND_IN)
     try:
-        port: Port = serial.serial_for_url(url, baudrate=baud, timeout=timeout_s, write_timeout=timeout_s)
+        port: Port = open_serial_port(url, baud, timeout_s)
     except (OSError, ValueError) as error:
         raise PortError(
             f"cannot open {url} at {baud} baud: {error}; check the name, the rights and the table"

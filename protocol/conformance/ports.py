@@ -21,15 +21,16 @@ def open_port(url: str, profile: Profile) -> ReopenablePort:
     """
     import serial  # noqa: PLC0415 - the pytest plug-in is loaded by runs that need no port
 
+    from protocol.serial_port import open_serial_port  # noqa: PLC0415 - for the same reason
+
     if _STAND_IN_PACKAGE not in serial.protocol_handler_packages:
         serial.protocol_handler_packages.append(_STAND_IN_PACKAGE)
     timeout_s = profile.serial.timeout_s
     try:
-        return serial.serial_for_url(
-            url, baudrate=profile.serial.baud or 9600, timeout=timeout_s, write_timeout=timeout_s, exclusive=True
-        )
+        port: ReopenablePort = open_serial_port(url, profile.serial.baud or 9600, timeout_s, exclusive=True)
     except (OSError, ValueError) as error:
         raise SessionError(f"cannot open {url}: {error}; check the name, the rights and the table") from error
+    return port
 
 
 def is_simulated(port: object) -> bool:

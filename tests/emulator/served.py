@@ -25,7 +25,8 @@ Start = Callable[..., StandIn]
 
 
 def open_port(url: str, baud: int = 9600) -> serial.Serial:
-    return serial.serial_for_url(url, baudrate=baud, timeout=10.0, write_timeout=10.0)
+    patience = {} if url.startswith("rfc2217:") else {"write_timeout": 10.0}  # which pyserial's client there lacks
+    return serial.serial_for_url(url, baudrate=baud, timeout=10.0, **patience)
 
 
 def ask(port: serial.Serial, command: bytes) -> bytes:

@@ -17,7 +17,8 @@ pytestmark = [
 ]
 
 
-@pytest.mark.parametrize("kind", ["--pty", "--tcp=0"])
+@pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # pyserial's RFC 2217 client calls them
+@pytest.mark.parametrize("kind", ["--pty", "--tcp=0", "--rfc2217=0"])
 def test_a_serial_client_drives_the_table_and_preempts_a_motion(
     stand_in: Start, kind: str, wait_until: WaitUntil
 ) -> None:

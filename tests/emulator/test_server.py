@@ -131,3 +131,38 @@ def test_a_client_that_comes_after_a_reset_is_not_taken_for_the_one_that_left(
         running = Server(table, Clock(1000, wall_s=wall), [port], signals, control, pytest.fail)
         running.run()
     assert port.sent == b"H 0.0\r"
+
+
+@pytest.mark.parametrize("moving", [False, True])
+@pytest.mark.parametrize("time_scale", [1.0, 10.0])
+@pytest.mark.parametrize(("pause_s", "missing_s"), [(0.4, 0.0), (0.6, 0.6), (3600.0, 3600.0)])
+def test_a_stop_of_more_than_half_a_second_is_left_out_at_rest_and_in_motion_alike(
+    table: Table, wall: Wall, port: ToldPort, *, moving: bool, time_scale: float, pause_s: float, missing_s: float
+) -> None:
+    """The clock of a process that was stopped (SIGSTOP) goes on; the table makes up for all or for nothing."""
+    said: list[str] = []
+    clock = Clock(1000, time_scale, wall_s=wall)
+    if moving:
+        table.receive(b"S 40\rR 4000\r")
+    ticks: list[int] = []
+
+    def pause() -> Arrival:
+        ticks.append(table.tick)
+        wall.now_s += pause_s
+        return Arrival()
+
+    def look() -> Arrival:
+        ticks.append(table.tick)
+        return Arrival()
+
+    def end() -> Arrival:
+        running.quit()
+        return Arrival()
+
+    port.arrivals = [pause, *([look] * 20), end]
+    with SignalWatch("SIGTERM") as signals:
+        running = Server(table, clock, [port], signals, None, said.append)
+        running.run()
+    made_up_s = (ticks[-1] - ticks[0]) / 1000 / time_scale
+    assert made_up_s == pytest.approx(pause_s - missing_s, abs=0.002)
+    assert bool(missing_s) == bool(said)

@@ -136,3 +136,24 @@ def test_a_client_that_resets_the_connection_has_left(
     client.close()
     port.send(b"OK\r")
     assert received(port, wait_until) == Arrival(left_after=True)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::"])  # noqa: S104  # what is to be warned of
+def test_a_port_that_other_computers_reach_is_said_to_be_open(host: str, warnings: list[str]) -> None:
+    try:
+        port = TcpPort(host, 0, warnings.append)
+    except OSError:
+        pytest.skip("this machine has no such address")
+    port.close()
+    assert len(warnings) == 1
+    assert "anybody who reaches it may drive the table" in warnings[0]
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1"])
+def test_a_port_of_this_computer_alone_is_not(host: str, warnings: list[str]) -> None:
+    try:
+        port = TcpPort(host, 0, warnings.append)
+    except OSError:
+        pytest.skip("this machine has no such address")
+    port.close()
+    assert warnings == []
