@@ -10,6 +10,10 @@ from emulator.fixed_point import INT32_MAX, POSITION_BITS, SPEED_BITS, to_fixed
 from emulator.profiler import Profile
 from protocol.messages import Angle, Command, ErrorCode, Ok, Refusal, Reply, Verb
 
+_LAST_POSITION = INT32_MAX << POSITION_BITS
+_HALF_RANGE = (INT32_MAX + 1) << POSITION_BITS
+"""The longest motion; and, below 0, the first position."""
+
 
 class Registers(NamedTuple):
     """What waits for the next motion command, and the latch."""
@@ -76,10 +80,11 @@ class Interpreter:
         self, verb: Verb, value: Fraction, controller: FirmwareState, registers: Registers
     ) -> tuple[Reply, FirmwareState, Registers]:
         distance = target = to_fixed(value * self._count_deg, POSITION_BITS)
-        farthest = INT32_MAX << POSITION_BITS
         if verb is Verb.MOVE_TO:
             distance = distance_to(controller.reference, target)
-        if abs(target) > farthest or abs(distance) > farthest:
+            if not -_HALF_RANGE <= target <= _LAST_POSITION:
+                return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
+        if abs(distance) > _HALF_RANGE:
             return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
         profile = Profile.of(registers.speed, registers.acceleration)
         return Ok(), begin_motion(controller, profile, distance), registers

@@ -82,9 +82,12 @@ def test_s_and_a_set_their_register_alone_rounded_to_its_unit(verb: Verb, name: 
         (Verb.SET_ACCELERATION, "100.1"),
         (Verb.SET_ACCELERATION, "0.00001"),
         (Verb.MOVE_TO, "4194304"),
-        (Verb.MOVE_TO, "-4194304"),
+        (Verb.MOVE_TO, "4194303.9981"),  # beyond the last count
+        (Verb.MOVE_TO, "-4194304.0000001"),
+        (Verb.MOVE_TO, "-4194304"),  # from beyond 0: longer than half the range
         (Verb.MOVE_BY, "99999999999999"),
-        (Verb.MOVE_BY, "-4194304"),
+        (Verb.MOVE_BY, "4194304.0000001"),
+        (Verb.MOVE_BY, "-4194304.0000001"),
     ],
 )
 def test_what_is_out_of_range_changes_nothing(verb: Verb, value: str) -> None:

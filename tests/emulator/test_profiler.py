@@ -219,7 +219,8 @@ extremes = st.sampled_from([1, 2, 7, ONE >> 10, ONE >> 5, ONE - 1, ONE])
     speed=st.sampled_from([1, 1000, SPEED_LIMIT // 2, SPEED_LIMIT]),
     acceleration=extremes,
     start_speed=st.sampled_from([-SPEED_LIMIT, -1, 0, 1, SPEED_LIMIT]) | start_speeds,
-    distance=st.sampled_from([1, ONE, INT32_MAX << POSITION_BITS]) | st.integers(0, INT32_MAX << POSITION_BITS),
+    distance=st.sampled_from([1, ONE, (INT32_MAX + 1) << POSITION_BITS])
+    | st.integers(0, (INT32_MAX + 1) << POSITION_BITS),
     near_braking=st.booleans(),
 )
 def test_no_intermediate_result_exceeds_64_bits(

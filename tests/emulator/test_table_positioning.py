@@ -144,13 +144,28 @@ class TestTheEndsOfTheCounter:
         assert math.isclose(status.true_deg, (2**31 - 100) / 512 + 10, abs_tol=0.2)
         assert move(table, "R -10").encoder_deg == pytest.approx((2**31 - 100) / 512, abs=REST_DEG)
 
-    @pytest.mark.parametrize("line", ["P 4194304", "P -4194304", "R 4194304", "R -99999999"])
+    @pytest.mark.parametrize("line", ["P 4194304", "P -4194304.001", "R 4194304.001", "R -99999999"])
     def test_a_position_beyond_the_counter_is_refused(self, line: str) -> None:
         table = Table(UNPACED)
         before = table.snapshot()
         assert ask(table, line) == b"ERR 3 out of range\r"
         assert table.snapshot().state == before.state
 
-    def test_the_last_positions_before_it_are_not(self) -> None:
-        assert ask(Table(UNPACED), "P 4194303.9") == b"OK\r"
-        assert ask(Table(UNPACED), "P -4194303.9") == b"OK\r"
+    @pytest.mark.parametrize("line", ["P 4194303.998", "P -4194304", "R 4194304", "R -4194304"])
+    def test_the_last_positions_before_it_and_half_of_its_range_are_not(self, line: str) -> None:
+        table = Table(UNPACED)
+        assert ask(table, line) == b"OK\r"
+        table.advance(2000)
+        travelled_deg = table.status().reference_deg
+        assert travelled_deg > 10 if line[2] == "4" else travelled_deg < -10
+
+    @pytest.mark.parametrize("direction", [1, -1])
+    def test_a_motion_of_half_the_range_ends_where_it_should(self, direction: int) -> None:
+        """The last part of it, from a counter that is preset; the target is the first position either way."""
+        table = Table(UNPACED)
+        table.reset(-(2**31) + 512 * 5)
+        assert move(table, "S 40", "A 100", "P -4194304").encoder_deg == pytest.approx(-4194304, abs=REST_DEG)
+        table.reset(0)
+        assert ask(table, f"R {direction * 4194304}") == b"OK\r"
+        assert ask(table, "P 3") == b"OK\r"
+        assert until_at_rest(table).encoder_deg == pytest.approx(3, abs=REST_DEG)
