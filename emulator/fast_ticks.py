@@ -37,12 +37,12 @@ _LONGEST_CALL_TICKS = 10_000_000
 class FastTicks:
     """`tick.run_undisturbed`, to the last bit, interpreted at first and compiled once that pays.
 
-    Args:
-        warm_up_ticks: how many to interpret at first; None for as many as is best here.
+    Attributes:
+        warm_up_ticks: how many are interpreted at first; None until it is known how many are best here.
     """
 
     def __init__(self, warm_up_ticks: int | None = None) -> None:
-        self._warm_up_ticks = warm_up_ticks
+        self.warm_up_ticks = warm_up_ticks
         self._interpreted_ticks = 0
         self._compiled: Run | None = None
         self._is_hopeless = find_spec("numba") is None
@@ -74,13 +74,13 @@ class FastTicks:
         """Return whether there is, or should now be, compiled code."""
         if self._compiled is not None:
             return True
-        if self._is_hopeless or (self._interpreted_ticks < LOADED_TICKS and self._warm_up_ticks is None):
+        if self._is_hopeless or (self._interpreted_ticks < LOADED_TICKS and self.warm_up_ticks is None):
             return False
-        if self._warm_up_ticks is None:
-            self._warm_up_ticks = NEW_TICKS
+        if self.warm_up_ticks is None:
+            self.warm_up_ticks = NEW_TICKS
             if has_machine_code():
-                self._warm_up_ticks = LOADED_TICKS if "numba" in sys.modules else KEPT_TICKS
-        if self._interpreted_ticks < self._warm_up_ticks:
+                self.warm_up_ticks = LOADED_TICKS if "numba" in sys.modules else KEPT_TICKS
+        if self._interpreted_ticks < self.warm_up_ticks:
             return False
         try:
             from emulator.machine_code import compiled  # noqa: PLC0415  # numba is imported only when that pays

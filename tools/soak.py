@@ -1,4 +1,4 @@
-"""Long runs of the stand-in, each with what must hold at its end: `python -m tools.soak noise day clients wrap`.
+"""Long runs of the stand-in, each with what must hold at its end: `python -m tools.soak noise day year clients wrap`.
 
 A soak is small in the tests and full here; both run these functions.
 """
@@ -15,6 +15,7 @@ from random import Random
 from typing import NamedTuple
 
 from emulator.config import load_config
+from emulator.fast_ticks import FastTicks
 from emulator.table import Table
 from protocol.client import TableClient
 from protocol.codec import decode_reply
@@ -69,17 +70,27 @@ def soak_noise(size: float, seed: int) -> Soak:
 
 
 def soak_day(hours: float, seed: int) -> Soak:
+    """Let random commands run for simulated hours, most of them in motion; see `_soak_motions`."""
+    return _soak_motions(hours, seed, pauses_ticks=(20, 200, 2000, 20_000, 100_000))
+
+
+def soak_year(days: float, seed: int) -> Soak:
+    """Let random commands run for simulated days, mostly at rest: about thirty a day; see `_soak_motions`."""
+    return _soak_motions(24 * days, seed, pauses_ticks=(200, 20_000, 200_000, 3_600_000, 10_000_000))
+
+
+def _soak_motions(hours: float, seed: int, pauses_ticks: Sequence[int]) -> Soak:
     """Let random commands run for simulated hours: memory stays flat, count and true angle never drift apart."""
     chance = Random(seed)  # noqa: S311 - no secret
     config = load_config()
-    table = Table(config, seed)
+    table = Table(config, seed, run=FastTicks())
     half_gap_deg = config.gears.backlash_arcmin / 60 / 2
     end, commands, worst_deg = round(hours * 3600 * _TICK_HZ), 0, 0.0
     sizes_kB: list[int] = []
     while table.tick < end:
         table.receive(_random_command(chance))
         commands += 1
-        table.advance(min(chance.choice((20, 200, 2000, 20_000, 100_000)), end - table.tick))
+        table.advance(min(chance.choice(pauses_ticks), end - table.tick))
         table.transmit()
         status = table.status()
         worst_deg = max(worst_deg, abs(status.encoder_deg - status.true_deg))
@@ -139,6 +150,7 @@ def soak_wrap(count: float, seed: int) -> Soak:
 SOAKS: dict[str, tuple[Callable[[float, int], Soak], float, str]] = {
     "noise": (soak_noise, 10_000_000, "random bytes"),
     "day": (soak_day, 24.0, "simulated hours of random commands"),
+    "year": (soak_year, 365.0, "simulated days of random commands, mostly at rest"),
     "clients": (soak_clients, 1000, "clients that come and go on a pty"),
     "wrap": (soak_wrap, 100, "runs over the end of the counter"),
 }

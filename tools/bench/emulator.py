@@ -20,9 +20,11 @@ import numpy as np
 from emulator import batch
 from emulator.config import TableConfig, load_config
 from emulator.interpreter import Interpreter
+from emulator.protocol_emulator import RUN, Serial
 from emulator.table import Table
 from emulator.tick import TableConstants, TableState
 from tools.bench.timing import median_s, percentile, print_table
+from tools.bench.virtual_run import random_run_inputs, run_in_virtual_time
 
 EXCHANGES = 2000
 
@@ -31,6 +33,7 @@ def bench(stream: TextIO) -> None:
     """Print every figure of the stand-in."""
     _bench_simulation(stream)
     _bench_growth(stream)
+    _bench_virtual_time(stream)
     _bench_round_trip(stream)
     _bench_start(stream)
     _bench_idle(stream)
@@ -70,6 +73,32 @@ def _bench_growth(stream: TextIO) -> None:
         rows.append((name, f"{wall_s / simulated_s * 1e6:.2f}", f"{peak_mb:.0f} MB"))
     header = ("simulated time (interpreted: alone in its process)", "us of work per s", "peak memory")
     print_table(stream, "Growth", header, rows)
+
+
+def _bench_virtual_time(stream: TextIO) -> None:
+    """Print what clients of `emulator://` wait for, interpreted as without numba, and compiled."""
+    plans = list(random_run_inputs(3, margin=3))
+    rows = []
+    for name, warm_up_ticks in (("interpreted", 10**15), ("compiled", 0)):
+        RUN.warm_up_ticks = warm_up_ticks
+        wait_s = median_s(_minute_of_motion())
+        speeds = sorted(run.simulated_s / run.real_s for run in map(run_in_virtual_time, [plans[0], *plans]))
+        rows.append((name, f"{wait_s * 1e3:.1f} ms", f"{speeds[0]:.0f} to {speeds[-1]:.0f} x"))
+    header = ("emulator://", "a minute of motion, then H", "a streamed plan, over real time")
+    print_table(stream, "Virtual time", header, rows)
+
+
+def _minute_of_motion() -> Callable[[], object]:
+    port = Serial("emulator://?baud=0", timeout=1.0)
+    port.write(b"S 40\rR 1000000\r")
+    port.read_until(b"\r")
+
+    def wait() -> None:
+        port.clock.sleep_s(60.0)
+        port.write(b"H\r")
+        port.read(port.in_waiting)
+
+    return wait
 
 
 def _bench_round_trip(stream: TextIO) -> None:
