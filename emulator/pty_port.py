@@ -12,7 +12,6 @@ import tty
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 from emulator.device_link import DeviceLink
 from emulator.framing import rates_agree, read_at_rate
@@ -21,6 +20,7 @@ from emulator.outbox import Outbox
 from emulator.port import Arrival
 from emulator.readiness import wait_for
 from emulator.terminal_baud import get_baud, set_baud
+from emulator.visit import Visit, doubtful_lines
 
 READ_BYTES = 256
 """What one look takes of a client that stays."""
@@ -34,39 +34,6 @@ _IN_FLIGHT_MS = 5
 _DEFAULT_BAUD = 9600
 _LOCAL_MODES = 3  # its place in the list of termios.tcgetattr
 _ECHO = termios.ECHO | termios.ECHONL
-
-
-class Visit(NamedTuple):
-    """What is known of the clients of one look at the device, who may have come and gone one after the other.
-
-    Attributes:
-        writers: clients of whom the bytes of this look may hold some.
-        counted: whether the one that is there now is among them.
-        left: a client has left, and no other was there.
-        another_came: after that, one has opened the device.
-    """
-
-    writers: int
-    counted: bool
-    left: bool = False
-    another_came: bool = False
-
-    @property
-    def another_wrote(self) -> bool:
-        """Whether a client is there who came when another had left, and has written."""
-        return self.another_came and self.counted
-
-
-def _doubtful_lines(writers: int, data: bytes) -> int:
-    """Return how many lines of `data`, from its first, may be half of one client's and half of another's.
-
-    Nobody can tell where one client's bytes end. When the lines may be one for each client, as those of commands of a
-    shell, a glued one can only be the first of them; otherwise it can be any.
-    """
-    ends = data.count(b"\r")
-    if writers < 2 or not data:
-        return 0
-    return 1 if ends == writers and data.endswith(b"\r") else ends + 1
 
 
 class PtyPort:
@@ -138,7 +105,7 @@ class PtyPort:
         if data and visit.another_came and not visit.another_wrote:
             visit = self._wait_for_a_write(visit)
         self._let_go()
-        doubtful = _doubtful_lines(visit.writers, data)
+        doubtful = doubtful_lines(visit.writers, data)
         if doubtful and not self._said_doubtful:
             self._warn(
                 f"two programs used {self.name} one right after the other, and nobody can tell which bytes are whose: "

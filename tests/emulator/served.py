@@ -6,6 +6,8 @@ from typing import Protocol
 
 import serial
 
+from protocol.serial_port import open_serial_port
+
 WaitUntil = Callable[[Callable[[], bool]], None]
 
 
@@ -25,8 +27,8 @@ Start = Callable[..., StandIn]
 
 
 def open_port(url: str, baud: int = 9600) -> serial.Serial:
-    patience = {} if url.startswith("rfc2217:") else {"write_timeout": 10.0}  # which pyserial's client there lacks
-    return serial.serial_for_url(url, baudrate=baud, timeout=10.0, **patience)
+    port: serial.Serial = open_serial_port(url, baud, timeout_s=10.0)
+    return port
 
 
 def ask(port: serial.Serial, command: bytes) -> bytes:

@@ -185,7 +185,7 @@ def test_a_port_that_is_taken_is_refused() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "--pty, --tcp"),
+        ([], "--pty, --tcp, --rfc2217"),
         (["--link", "x", "--tcp", "0"], "--pty"),
         (["--pty", "--baud", "-1"], "baud"),
         (["--pty", "--baud", "fast"], "--baud"),
@@ -203,6 +203,13 @@ def test_a_port_that_is_taken_is_refused() -> None:
         (["--pty", "--control", "x" * 200], "--control"),
         (["--pty", "--sed", "1"], "--sed"),
         (["--pty", "--seed", "-1"], "--seed"),
+        (["--pty", "--seed", "9" * 5000], "--seed"),
+        (["--pty", "--baud", "9" * 4000], "baud"),
+        (["--pty", "--time-scale", "1e306"], "--time-scale"),
+        (["--pty", "--time-scale", "1e-9"], "--time-scale"),
+        (["--tcp", "9" * 5000], "--tcp"),
+        (["--rfc2217", "70000"], "--rfc2217"),
+        (["--pty", "--config", "/dev/zero"], "/dev/zero"),
     ],
 )
 def test_what_cannot_be_used_is_one_line_and_status_2(arguments: list[str], words: str) -> None:

@@ -242,3 +242,63 @@ def test_any_bytes_leave_a_table_that_answers(pieces: list[bytes]) -> None:
         port.clock.sleep_s(0.5)
         port.reset_input_buffer()
         assert ask(port, b"H").startswith(b"H ")
+
+
+class ByteByByte(Serial):
+    """The port without leaps: it looks at the table after each byte in either direction."""
+
+    def _advance_to_bytes(self, wanted: int, deadline: int | None) -> bool:
+        del wanted
+        return self._advance_to_byte(deadline)
+
+
+WRITTEN = [b"H\r", b"P 5\rH\r", b"R -3", b"\r", b"L\rL\rL\r", b"Q" * 40, b"S 1\r" * 30]
+FAULTS: list[tuple[str, dict[str, float]]] = [
+    ("drop", {"probability": 0.3}),
+    ("half-reply", {"bytes": 2}),
+    ("delay", {"seconds": 0.01, "for_s": 0.2}),
+]
+CALLS = st.one_of(
+    st.tuples(st.just("write"), st.sampled_from(WRITTEN)),
+    st.tuples(st.just("read"), st.integers(0, 30)),
+    st.tuples(st.just("read_until"), st.sampled_from([b"\r", b"0\r", b"\n", b"K"])),
+    st.tuples(st.just("in_waiting"), st.none()),
+    st.tuples(st.just("flush"), st.none()),
+    st.tuples(st.just("sleep"), st.integers(0, 50)),
+    st.tuples(st.just("timeout"), st.sampled_from([0, 0.003, 0.05, 1.0])),
+    st.tuples(st.just("baudrate"), st.sampled_from([9600, 4800, 115_200])),
+    st.tuples(st.just("fault"), st.sampled_from(FAULTS)),
+    st.tuples(st.just("train"), st.sampled_from([0.0, 170.0])),
+)
+
+
+def call(port: Serial, name: str, what: Any) -> object:  # noqa: ANN401  # whatever the call takes
+    match name:
+        case "write" | "read" | "read_until":
+            return getattr(port, name)(what)
+        case "in_waiting":
+            return port.in_waiting
+        case "flush":
+            port.flush()
+        case "sleep":
+            port.clock.sleep_s(what / 1000)
+        case "fault":
+            port.table.inject(fault_from(*what))
+        case "train":
+            port.table.trigger_hz = what
+        case _:
+            setattr(port, name, what)
+    return None
+
+
+@settings(max_examples=60)
+@given(
+    calls=st.lists(CALLS, max_size=25),
+    query=st.sampled_from(["", "?baud=300", "?baud=115200&decimals=4", "?baud=4000000", "?baud=0", "?strict=1"]),
+)
+def test_leaps_to_whole_lines_change_neither_bytes_nor_times(calls: list[tuple[str, Any]], query: str) -> None:
+    leaping, stepping = (kind("emulator://" + query, timeout=0.2) for kind in (Serial, ByteByByte))
+    for name, what in calls:
+        assert call(leaping, name, what) == call(stepping, name, what), (name, what)
+        assert leaping.table.tick == stepping.table.tick, (name, what)
+    assert leaping.table.status() == stepping.table.status()
