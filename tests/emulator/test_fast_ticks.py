@@ -106,6 +106,19 @@ def test_compiled_stretches_leave_the_states_of_a_table_that_is_watched(
     assert visible(watched) == visible(interpreted) == visible(compiled)
 
 
+@pytest.mark.parametrize("config", CONFIGS, ids=lambda config: f"{config.serial.baud} baud")
+@pytest.mark.parametrize("pause_ticks", [1, 13, 400])
+def test_lines_that_pass_in_one_stretch_leave_the_wire_as_single_ticks_do(
+    config: TableConfig, pause_ticks: int
+) -> None:
+    watched, compiled = Table(config), Table(config, run=COMPILED)
+    watched.observer = lambda _status, _heard, _said: None
+    for line in (b"H\r", b"P 5\rH\r", b"R -3", b"\r", b"H\r" * 40, b"L\rL\r"):
+        for deed, what in (("receive", line), ("advance", pause_ticks), ("advance", 300)):
+            assert do(watched, deed, what) == do(compiled, deed, what), (line, deed, what)
+            assert visible(watched) == visible(compiled), (line, deed, what)
+
+
 def moving_table(run: FastTicks) -> Table:
     table = Table(load_config().with_serial(baud=0), run=run)
     table.receive(b"S 40\rA 100\rR 3000\r")

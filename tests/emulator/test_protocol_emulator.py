@@ -291,6 +291,15 @@ def call(port: Serial, name: str, what: Any) -> object:  # noqa: ANN401  # whate
     return None
 
 
+@pytest.mark.parametrize("query", ["", "?baud=300", "?baud=115200&decimals=4", "?baud=4000000", "?baud=0"])
+def test_leaps_end_where_single_steps_do(query: str) -> None:
+    leaping, stepping = (kind("emulator://" + query, timeout=0.5) for kind in (Serial, ByteByByte))
+    for line in (b"H\r", b"P 5\r", b"H\rL\r", b"Q\r", b"R 3\rH\r"):
+        for name, what in (("write", line), ("read", 2), ("read_until", b"\r"), ("sleep", 7), ("read_until", b"\r")):
+            assert call(leaping, name, what) == call(stepping, name, what), (line, name)
+            assert leaping.table.tick == stepping.table.tick, (line, name)
+
+
 @settings(max_examples=60)
 @given(
     calls=st.lists(CALLS, max_size=25),
