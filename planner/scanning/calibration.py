@@ -1,20 +1,35 @@
 """Find the table's axis from a reference sphere that turns with the table: its centre moves on a circle.
 
-A fit that is not plausible is refused, with the figure that says so.
+A fit that is not plausible, or too uncertain for the scan, is refused with the figure that says so.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from scipy import stats
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from planner.arrays import FloatArray
 from planner.errors import PlannerError
 from planner.geometry.transforms import rotations_z
+from planner.scanning.score_tests import FALSE_ALARMS, Change, NormalEquations, find_change
 
-# The least that determines an axis, and one more to judge it by.
-_FEWEST_ANGLES = 4
+GREATEST_POINT_ERROR_MM = 0.1
+"""How far (1 sigma) the uncertainty of a calibration may move a point of the scan: four times the probe's noise."""
+# Three determine an axis, and one more shows whether it is one. Angles nearer than this are the same place.
+_FEWEST_PLACES = 4
+_SAME_PLACE_DEG = 10.0
+# The noise of a sphere's centre that is assumed at least: few residuals can agree by chance.
+_LEAST_NOISE_MM = 0.002
+# Two tests share the allowed false alarms: all residuals together, and their order.
+_ALARMS_EACH = FALSE_ALARMS / 2.0
+# The unknowns of the fit: tilt (rad) and shift (mm) of the axis, and where the sphere sits on the table (mm).
+_AXIS, _SEAT = slice(0, 4), slice(4, 7)
+# A sphere of known radius has three unknowns; a second centre whose residual is up to this larger fits as well.
+_FEWEST_POINTS = 4
+_RIVAL_RATIO = 1.5
 # A circle that short or that small does not say where its axis is.
 _SHORTEST_ARC_DEG = 90.0
 _SMALLEST_CIRCLE_MM = 10.0
@@ -25,6 +40,13 @@ class CalibrationError(PlannerError):
     """Measurements that do not determine a placement, or contradict each other."""
 
 
+class PartSize(NamedTuple):
+    """The cylinder about the table's axis that holds the part, from the table's top upwards, in mm."""
+
+    radius_mm: float = 150.0
+    height_mm: float = 200.0
+
+
 @dataclass(frozen=True, eq=False)
 class AxisCalibration:
     """Where the table's axis is.
@@ -33,15 +55,26 @@ class AxisCalibration:
         T_BT: The table in the base, `(4, 4)`: z along the axis; origin and x as near to the nominal ones as z allows.
         residuals_mm: `(n,)` distance of each sphere centre from where the fit has it.
         rms_mm: Their root mean square.
+        uncertainty_mm: Expected distance (root mean square) of the axis from the true one, at the table's top.
+        uncertainty_deg: Expected angle (root mean square) between the two.
+        point_error_mm: Root mean square of how far both together move a point at the worst place of the part.
     """
 
     T_BT: FloatArray
     residuals_mm: FloatArray
     rms_mm: float
+    uncertainty_mm: float
+    uncertainty_deg: float
+    point_error_mm: float
 
 
 def calibrate_table_axis(
-    centres_B: FloatArray, angles_deg: FloatArray, nominal_T_BT: FloatArray, greatest_rms_mm: float = 0.1
+    centres_B: FloatArray,
+    angles_deg: FloatArray,
+    nominal_T_BT: FloatArray,
+    greatest_rms_mm: float = 0.2,
+    noise_mm: float | None = None,
+    part: PartSize | None = None,
 ) -> AxisCalibration:
     """Return the table's axis from the centres of a sphere that turns with it.
 
@@ -49,16 +82,51 @@ def calibrate_table_axis(
     linear fit without those two conditions gives the start for the fit with them. What the centres cannot tell, where
     along the axis the table's top is and which direction angle 0 has, is taken from the nominal placement.
 
+    The uncertainty follows from the covariance of the fit. It is refused where it would move a point of the part by
+    more than `GREATEST_POINT_ERROR_MM`. The residuals are tested for a sphere that moved on the table.
+
     Args:
-        centres_B: Centres in the base, `(n, 3)` in mm.
+        centres_B: Centres in the base, `(n, 3)` in mm, in the order in which they were taken.
         angles_deg: The table's angle at each, `(n,)`.
         nominal_T_BT: About where the table is.
         greatest_rms_mm: A worse fit is refused.
+        noise_mm: Standard deviation of each coordinate of a centre; estimated from the residuals where left out, and
+            then at least 0.002 mm.
+        part: What will be scanned.
 
     Raises:
-        CalibrationError: The centres do not determine an axis, or do not lie as on a turning table.
+        CalibrationError: The centres do not determine the axis well enough, or do not lie as on a turning table.
     """
     _check_angles(centres_B, angles_deg)
+    start, seat_T = _start(centres_B, angles_deg, nominal_T_BT)
+
+    def residuals(unknown: FloatArray) -> FloatArray:
+        T_BT = _tilted(start, unknown[_AXIS])
+        on_circle = rotations_z(angles_deg)[:, :3, :3] @ unknown[_SEAT]
+        return np.asarray((on_circle @ T_BT[:3, :3].T + T_BT[:3, 3] - centres_B).ravel())
+
+    fit = least_squares(residuals, np.concatenate((np.zeros(4), seat_T)), x_scale="jac")
+    T_BT = _tilted(start, fit.x[_AXIS])
+    each_mm = np.linalg.norm(fit.fun.reshape(-1, 3), axis=1)
+    rms_mm = float(np.sqrt(np.mean(each_mm**2)))
+    if rms_mm > greatest_rms_mm:
+        raise CalibrationError(
+            f"the sphere's centres lie {rms_mm:.3f} mm (rms) off a turning table's circle; allowed are"
+            f" {greatest_rms_mm:g} mm: were the sphere or the table's foot loose, or the angles not those of the views?"
+        )
+    freedom = len(fit.fun) - len(fit.x)
+    estimated_mm = float(np.sqrt(np.sum(fit.fun**2) / freedom))
+    deviation_mm = max(estimated_mm, _LEAST_NOISE_MM if noise_mm is None else noise_mm)
+    jacobian = np.asarray(fit.jac)
+    _check_residuals(fit.fun, jacobian, angles_deg, noise_mm, rms_mm)
+    _check_axis(T_BT, nominal_T_BT)
+    covariance = deviation_mm**2 * np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)[_AXIS, _AXIS]
+    uncertainty = _uncertainty(covariance, part or PartSize())
+    return AxisCalibration(_placed_on_axis(nominal_T_BT, T_BT[:3, 3], T_BT[:3, 2]), each_mm, rms_mm, *uncertainty)
+
+
+def _start(centres_B: FloatArray, angles_deg: FloatArray, nominal_T_BT: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return about where the table is, and where the sphere sits on it, from a linear fit."""
     theta = np.radians(angles_deg)
     design = np.column_stack((np.ones_like(theta), np.cos(theta), np.sin(theta)))
     middle, u, v = np.linalg.lstsq(design, centres_B, rcond=None)[0]
@@ -70,31 +138,64 @@ def calibrate_table_axis(
             f" put it at least {_SMALLEST_CIRCLE_MM:g} mm off the table's axis"
         )
     start = _placed_on_axis(nominal_T_BT, middle, axis / np.linalg.norm(axis))
-    seat_T = rotations_z(-angles_deg)[:, :3, :3] @ ((centres_B - start[:3, 3]) @ start[:3, :3])[:, :, np.newaxis]
+    seats_T = rotations_z(-angles_deg)[:, :3, :3] @ ((centres_B - start[:3, 3]) @ start[:3, :3])[:, :, np.newaxis]
+    return start, seats_T.mean(axis=0).ravel()
 
-    def residuals(unknown: FloatArray) -> FloatArray:
-        T_BT = _tilted(start, unknown[:4])
-        on_circle = rotations_z(angles_deg)[:, :3, :3] @ unknown[4:]
-        return np.asarray((on_circle @ T_BT[:3, :3].T + T_BT[:3, 3] - centres_B).ravel())
 
-    fit = least_squares(residuals, np.concatenate((np.zeros(4), seat_T.mean(axis=0).ravel())), x_scale="jac")
-    T_BT = _tilted(start, fit.x[:4])
-    each_mm = np.linalg.norm(fit.fun.reshape(-1, 3), axis=1)
-    rms_mm = float(np.sqrt(np.mean(each_mm**2)))
-    if rms_mm > greatest_rms_mm:
+def _check_residuals(
+    residuals_mm: FloatArray, jacobian: FloatArray, angles_deg: FloatArray, noise_mm: float | None, rms_mm: float
+) -> None:
+    """Refuse residuals that are larger than the noise, or show that the sphere moved on the table."""
+    deviation_mm = noise_mm if noise_mm is not None else 1.0
+    groups = np.repeat(np.arange(len(angles_deg)), 3)
+    equations = NormalEquations.of(residuals_mm / deviation_mm, jacobian / deviation_mm, groups)
+    change = find_change(equations, _SEAT, _ALARMS_EACH, noise_is_known=noise_mm is not None)
+    # What is far below any sphere's noise is rounding, whatever its order.
+    if change is not None and (noise_mm is not None or rms_mm > 0.1 * _LEAST_NOISE_MM):
         raise CalibrationError(
-            f"the sphere's centres lie {rms_mm:.3f} mm (rms) off a turning table's circle; allowed are"
-            f" {greatest_rms_mm:g} mm: were the sphere or the table's foot loose, or the angles not those of the views?"
+            f"the sphere's centres lie {rms_mm:.3f} mm (rms) off a turning table's circle, and {_what_changed(change)}"
         )
-    _check_axis(T_BT, nominal_T_BT)
-    return AxisCalibration(_placed_on_axis(nominal_T_BT, T_BT[:3, 3], T_BT[:3, 2]), each_mm, rms_mm)
+    if noise_mm is not None and stats.chi2.sf(equations.chi_square, equations.freedom) < _ALARMS_EACH:
+        ratio = np.sqrt(equations.chi_square / equations.freedom)
+        raise CalibrationError(
+            f"the sphere's centres lie {rms_mm:.3f} mm (rms) off a turning table's circle, {ratio:.1f} times their"
+            " noise: were the sphere or the table's foot loose, or the angles not those of the views?"
+        )
+
+
+def _what_changed(change: Change) -> str:
+    if change.kind == "drift":
+        return "the sphere drifts on the table: is it fixed, does the cell still warm up?"
+    if change.kind == "step":
+        return f"the sphere is elsewhere from centre {change.group + 1} on: did it move on the table?"
+    return f"centre {change.group + 1} does not agree with the others: is its angle right?"
+
+
+def _uncertainty(covariance: FloatArray, part: PartSize) -> tuple[float, float, float]:
+    """Return the standard deviations of the axis (mm and deg), and of a point at the worst place of the part (mm)."""
+    tilt_rad, shift_mm = (float(np.sqrt(np.trace(block))) for block in (covariance[:2, :2], covariance[2:, 2:]))
+    azimuth = np.radians(np.arange(0.0, 360.0, 15.0))
+    error_mm = max(
+        float(np.sqrt(np.trace(moves @ covariance @ moves.T)))
+        for z in (0.0, part.height_mm)
+        for x, y in part.radius_mm * np.column_stack((np.cos(azimuth), np.sin(azimuth)))
+        for moves in [np.array([[0.0, z, 1.0, 0.0], [-z, 0.0, 0.0, 1.0], [y, -x, 0.0, 0.0]])]
+    )
+    if not error_mm <= GREATEST_POINT_ERROR_MM:
+        raise CalibrationError(
+            f"the centres leave the table's axis open by {shift_mm:.2g} mm and {np.degrees(tilt_rad):.2g} deg (1 sigma)"
+            f"; a point of a part of {part.radius_mm:g} mm radius and {part.height_mm:g} mm height is then"
+            f" {error_mm:.2g} mm wrong, and allowed are {GREATEST_POINT_ERROR_MM:g} mm: spread the table angles,"
+            " or put the sphere farther off the axis"
+        )
+    return shift_mm, float(np.degrees(tilt_rad)), error_mm
 
 
 def _check_angles(centres_B: FloatArray, angles_deg: FloatArray) -> None:
-    if len(centres_B) != len(angles_deg) or len(angles_deg) < _FEWEST_ANGLES:
+    if len(centres_B) != len(angles_deg) or len(angles_deg) < _FEWEST_PLACES:
         raise CalibrationError(
             f"there are {len(centres_B)} sphere centres and {len(angles_deg)} table angles;"
-            f" the axis needs as many of either, and at least {_FEWEST_ANGLES}"
+            f" the axis needs as many of either, and at least {_FEWEST_PLACES}"
         )
     if not (np.isfinite(centres_B).all() and np.isfinite(angles_deg).all()):
         raise CalibrationError("a sphere centre or a table angle is not a finite number")
@@ -103,6 +204,25 @@ def _check_angles(centres_B: FloatArray, angles_deg: FloatArray) -> None:
         raise CalibrationError(
             f"the table angles span only {arc_deg:.0f} deg; the axis needs at least {_SHORTEST_ARC_DEG:g}"
         )
+    places = _distinct_places(angles_deg)
+    if places < _FEWEST_PLACES:
+        raise CalibrationError(
+            f"the {len(angles_deg)} table angles are only {places} distinct places; the axis needs at least"
+            f" {_FEWEST_PLACES} that are {_SAME_PLACE_DEG:g} deg apart"
+        )
+
+
+def _distinct_places(angles_deg: FloatArray) -> int:
+    """Return how many of the angles are apart from one another."""
+    turned = np.sort(np.mod(angles_deg, 360.0))
+    # Counting begins after the widest gap, so that no place lies on both sides of 0.
+    turned = np.roll(turned, -int(np.argmax(np.diff(turned, prepend=turned[-1] - 360.0))))
+    ways = np.mod(turned - turned[0], 360.0)
+    places, last = 0, -np.inf
+    for way in ways.tolist():
+        if way >= last + _SAME_PLACE_DEG - 1e-6:
+            places, last = places + 1, way
+    return places
 
 
 def _shortest_arc_deg(angles_deg: FloatArray) -> float:
@@ -139,13 +259,68 @@ def _tilted(T: FloatArray, tilt_and_shift: FloatArray) -> FloatArray:
     return np.asarray(T @ moved)
 
 
+class SphereFit(NamedTuple):
+    """A sphere of known radius through points.
+
+    Attributes:
+        centre: `(3,)` in mm.
+        rms_mm: Root mean square of the points' heights above it.
+        deviations_mm: `(3,)` standard deviation of each coordinate of the centre, for heights with the given noise.
+    """
+
+    centre: FloatArray
+    rms_mm: float
+    deviations_mm: FloatArray
+
+
 def sphere_centre(points: FloatArray, radius_mm: float) -> FloatArray:
-    """Return the centre `(3,)` of a sphere of known radius through points `(m, 3)`, by least squares."""
-    # |p|^2 = 2 p.c + (r^2 - |c|^2) is linear and gives the start.
-    design = np.column_stack((2.0 * points, np.ones(len(points))))
-    start = np.linalg.lstsq(design, np.sum(points**2, axis=1), rcond=None)[0][:3]
+    """Return the centre `(3,)` of a sphere of known radius through points `(m, 3)`, by least squares.
+
+    Points in one plane, as of a single profile, fit two spheres, one on each side of their plane; they are refused.
+
+    Raises:
+        CalibrationError: There are fewer than 4 points, or two centres fit equally well.
+    """
+    return fit_sphere(points, radius_mm).centre
+
+
+def fit_sphere(points: FloatArray, radius_mm: float, noise_mm: float = 0.0) -> SphereFit:
+    """Return the sphere of known radius through points `(m, 3)`, with its uncertainty; see `sphere_centre`.
+
+    Args:
+        points: In mm.
+        radius_mm: The sphere's radius.
+        noise_mm: Standard deviation of the points' heights.
+    """
+    if len(points) < _FEWEST_POINTS or not np.isfinite(points).all():
+        raise CalibrationError(f"a sphere's centre needs at least {_FEWEST_POINTS} points, all of them finite")
 
     def heights(centre: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.norm(points - centre, axis=1) - radius_mm)
 
-    return np.asarray(least_squares(heights, start).x)
+    # |p|^2 = 2 p.c + (r^2 - |c|^2) is linear and gives the start.
+    middle = points.mean(axis=0)
+    design = np.column_stack((2.0 * (points - middle), np.ones(len(points))))
+    start = middle + np.linalg.lstsq(design, np.sum((points - middle) ** 2, axis=1), rcond=None)[0][:3]
+    across = np.linalg.svd(points - middle, full_matrices=False)[2][2]
+    # Where the points are nearly flat, the linear fit leaves the side open: both are tried.
+    offset_mm = (start - middle) @ across
+    height_mm = np.sqrt(max(radius_mm**2 - np.mean(np.sum((points - middle) ** 2, axis=1)), (0.1 * radius_mm) ** 2))
+    ends = [
+        least_squares(heights, start + (side * height_mm - offset_mm) * across, x_scale=radius_mm)
+        for side in (1.0, -1.0)
+    ]
+    ends.sort(key=lambda end: float(end.cost))
+    one, other = (end.x for end in ends)
+    if (
+        ends[1].cost <= _RIVAL_RATIO**2 * ends[0].cost + 1e-12 * len(points)
+        and np.linalg.norm(one - other) > 0.01 * radius_mm
+    ):
+        a, b = (", ".join(f"{value:.2f}" for value in centre) for centre in (one, other))
+        raise CalibrationError(
+            f"the points of the sphere lie in one plane; centres at ({a}) and ({b}) mm fit equally well:"
+            " take profiles from another place as well"
+        )
+    jacobian = np.asarray(ends[0].jac)
+    deviations_mm = noise_mm * np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)))
+    return SphereFit(one, float(np.sqrt(np.mean(ends[0].fun ** 2))), deviations_mm)

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from planner.arrays import FloatArray
-from planner.scanning.calibration import CalibrationError
+from planner.scanning.calibration import GREATEST_POINT_ERROR_MM, CalibrationError
+from planner.scanning.probe_fit import CENTRE, RADIUS, SHIFT, TURN, ProbeFit, Views, cosines, fit_probe
+from planner.scanning.score_tests import FALSE_ALARMS, Change, NormalEquations, find_change
 
 # The least that determines a place and says how well.
 _FEWEST_POSES = 6
@@ -20,8 +22,16 @@ _FEWEST_POSES = 6
 _SEARCH_POINTS = 24
 _SEARCH_EVALUATIONS = 60
 # Two ends of the search are the same minimum when they are this near; one that fits almost as well is a rival.
-_SAME_DEG = 2.0
+_SAME_DEG, _SAME_MM = 2.0, 2.0
 _RIVAL_RATIO = 1.5
+# A view of a sphere is at most as wide as the sphere; one much smaller than this share of it is in another unit.
+_WIDEST, _NARROWEST = 2.2, 0.02
+# The depth of a point on which the uncertainty is judged: the middle of the probe's range.
+_DEPTH_MM = 150.0
+# A radius that the views know less well than this is not checked by them.
+_GREATEST_RADIUS_UNCERTAINTY_MM = 0.05
+# Three tests share the allowed false alarms: all residuals together, the radius, and their order.
+_ALARMS_EACH = FALSE_ALARMS / 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +43,12 @@ class ProbeCalibration:
         centre_B_mm: The reference sphere's centre in the base, `(3,)`.
         residuals_mm: `(m,)` height of each point above the sphere.
         rms_mm: Their root mean square.
-        uncertainty_mm: Standard deviation of the worst of T_FS's three coordinates.
-        uncertainty_deg: The same of its three angles.
+        noise_ratio: Root of chi-square over its degrees of freedom: the residual in units of the probe's noise.
+        fitted_radius_mm: The sphere's radius as the same views give it.
+        radius_uncertainty_mm: Its standard deviation.
+        uncertainty_mm: Expected distance (root mean square) of T_FS's origin from where it truly is.
+        uncertainty_deg: Expected angle (root mean square) between T_FS's axes and the true ones.
+        point_error_mm: Root mean square of how far both together move a point in the middle of the probe's range.
         starts: From how many guesses the fit was searched for.
         wrong_starts: How many of them ended in a false minimum.
     """
@@ -43,8 +57,12 @@ class ProbeCalibration:
     centre_B_mm: FloatArray
     residuals_mm: FloatArray
     rms_mm: float
+    noise_ratio: float
+    fitted_radius_mm: float
+    radius_uncertainty_mm: float
     uncertainty_mm: float
     uncertainty_deg: float
+    point_error_mm: float
     starts: int
     wrong_starts: int
 
@@ -54,7 +72,8 @@ def calibrate_probe(
     points_S: Sequence[FloatArray],
     radius_mm: float,
     nominal_T_FS: FloatArray,
-    greatest_rms_mm: float = 0.075,
+    noise_mm: float = 0.025,
+    radius_tolerance_mm: float = 0.002,
 ) -> ProbeCalibration:
     """Return the probe's place on the flange from views of a sphere that stands still, of known radius.
 
@@ -62,53 +81,141 @@ def calibrate_probe(
     circles, and a circle does not say on which side of it the centre is; so a single guess can end in a false minimum.
     The search starts from the nominal place turned into each of the 24 directions of a cube; the best end counts.
 
+    The fit weights each point by its noise, which is that along the ray times the cosine of the incidence. Then the
+    residuals are tested: all of them against the noise (chi-square), the radius that fits best against the one given,
+    and their order for a sphere or a probe that moved, drifted, or was elsewhere in one view. Clean data are refused
+    once in 1000 times. The arm is taken as exact.
+
     Args:
-        T_BF: Flange poses of the views, `(n, 4, 4)`.
+        T_BF: Flange poses of the views, `(n, 4, 4)`, in the order in which they were taken.
         points_S: The points of each view, `(m, 3)` in frame S.
         radius_mm: The sphere's radius.
         nominal_T_FS: About where the probe is.
-        greatest_rms_mm: A worse fit is refused; the default is three times the noise of the probe.
+        noise_mm: Standard deviation of a point along its ray.
+        radius_tolerance_mm: Standard deviation of the sphere's radius, as its certificate has it.
 
     Raises:
         CalibrationError: The views do not determine the place, or contradict each other.
     """
-    _check_views(T_BF, points_S)
-    thinned = _Views.of(T_BF, [view[:: max(1, len(view) // _SEARCH_POINTS)] for view in points_S])
-    found = [_fit(thinned, radius_mm, guess, _SEARCH_EVALUATIONS) for guess in cube_turns(nominal_T_FS)]
+    _check_views(T_BF, points_S, radius_mm)
+    thinned = Views.of(T_BF, [view[:: max(1, len(view) // _SEARCH_POINTS)] for view in points_S])
+    found = [
+        fit_probe(thinned, radius_mm, guess, evaluations=_SEARCH_EVALUATIONS) for guess in cube_turns(nominal_T_FS)
+    ]
     best = min(found, key=lambda end: end.rms_mm)
-    fit = _fit(_Views.of(T_BF, points_S), radius_mm, best.T_FS)
-    if fit.rms_mm > greatest_rms_mm:
-        raise CalibrationError(
-            f"the points lie {fit.rms_mm:.3f} mm (rms) off one sphere of radius {radius_mm:g} mm; allowed are"
-            f" {greatest_rms_mm:g} mm: is this the sphere, did it move, is the probe where it is said to be?"
-        )
+    mirrored = _beyond_the_plane(thinned, best)
+    found.append(fit_probe(thinned, radius_mm, mirrored, best.centre, evaluations=_SEARCH_EVALUATIONS))
+    views = Views.of(T_BF, points_S)
+    weights = 1.0 / (noise_mm * cosines(views, best.T_FS, best.centre))
+    fit = fit_probe(views, radius_mm, best.T_FS, best.centre, weights)
+    free = fit_probe(views, radius_mm, fit.T_FS, fit.centre, weights, radius_is_known=False)
+    radius_uncertainty_mm = float(np.sqrt(_covariance(free, weights)[RADIUS, RADIUS].item()))
+    radius_score = ((free.radius_mm - radius_mm) / np.hypot(radius_uncertainty_mm, radius_tolerance_mm)) ** 2
+    ratio = _check_residuals(views, fit, weights, free.radius_mm, radius_score)
     rival = _rival(found, best)
     if rival is not None:
         raise CalibrationError(
-            f"the views fit two places of the probe equally well, {rival:.0f} deg apart;"
-            " look at the sphere from more directions, off the middle of the line as well"
+            f"the views fit two places of the probe equally well, {rival};"
+            " look at the sphere from more directions, off the middle of the line and on both sides of it as well"
         )
-    uncertainty_mm, uncertainty_deg = _uncertainty(fit)
-    if not uncertainty_mm < 1.0:
+    covariance = max(1.0, ratio**2) * _covariance(fit, weights)
+    uncertainty_mm, uncertainty_rad = (float(np.sqrt(np.trace(covariance[each, each]))) for each in (SHIFT, TURN))
+    point_error_mm = _point_error_mm(fit, covariance)
+    if not point_error_mm <= GREATEST_POINT_ERROR_MM:
         raise CalibrationError(
-            f"the views leave the probe's place open by {uncertainty_mm:.1f} mm (1 sigma);"
-            " look at the sphere from directions that differ more, and turn the probe about its beam as well"
+            f"the views leave the probe's place open by {uncertainty_mm:.2g} mm and"
+            f" {np.degrees(uncertainty_rad):.2g} deg (1 sigma), which moves a point by {point_error_mm:.2g} mm;"
+            f" allowed are {GREATEST_POINT_ERROR_MM:g} mm: look at the sphere from directions that differ more, and"
+            " turn the probe about its beam as well"
         )
-    wrong = sum(_apart_deg(end, best) > _SAME_DEG for end in found)
+    if not radius_uncertainty_mm <= _GREATEST_RADIUS_UNCERTAINTY_MM:
+        raise CalibrationError(
+            f"the views give the sphere's radius only to {radius_uncertainty_mm:.2g} mm (1 sigma), too little to check"
+            f" whether it is {radius_mm:g} mm; move the line over the sphere in more steps"
+        )
     return ProbeCalibration(
-        fit.T_FS, fit.centre, fit.residuals, fit.rms_mm, uncertainty_mm, uncertainty_deg, len(found), wrong
+        T_FS=fit.T_FS,
+        centre_B_mm=fit.centre,
+        residuals_mm=fit.heights_mm,
+        rms_mm=fit.rms_mm,
+        noise_ratio=ratio,
+        fitted_radius_mm=free.radius_mm,
+        radius_uncertainty_mm=radius_uncertainty_mm,
+        uncertainty_mm=uncertainty_mm,
+        uncertainty_deg=float(np.degrees(uncertainty_rad)),
+        point_error_mm=point_error_mm,
+        starts=len(found),
+        wrong_starts=sum(_are_apart(end, best) for end in found),
     )
 
 
-def _rival(found: Sequence["_Fit"], best: "_Fit") -> float | None:
-    """Return how far (deg) another minimum is that fits as well as the best one, or None."""
+def _check_residuals(
+    views: Views, fit: ProbeFit, weights: FloatArray, free_radius_mm: float, radius_score: float
+) -> float:
+    """Refuse residuals that are not the probe's noise; return them in units of that noise.
+
+    Of a sphere of another size and one that moved, the one that explains more of the residuals is named.
+    """
+    residuals, jacobian = weights * fit.heights_mm, weights[:, np.newaxis] * fit.jacobian
+    equations = NormalEquations.of(residuals, jacobian, views.view)
+    ratio = float(np.sqrt(equations.chi_square / max(1, equations.freedom)))
+    off = f"the points lie {fit.rms_mm:.3f} mm (rms) off one sphere of radius {fit.radius_mm:g} mm"
+    change = find_change(equations, CENTRE, _ALARMS_EACH, noise_is_known=True)
+    if stats.chi2.sf(radius_score, 1) < _ALARMS_EACH and (change is None or radius_score > change.statistic):
+        raise CalibrationError(
+            f"{off}, and fit one of {free_radius_mm:.3f} mm better: is this the sphere, is its radius in mm?"
+        )
+    if change is not None:
+        raise CalibrationError(f"{off}, and {_what_changed(change)}")
+    if stats.chi2.sf(equations.chi_square, max(1, equations.freedom)) < _ALARMS_EACH:
+        raise CalibrationError(
+            f"{off}, {ratio:.2f} times the probe's noise: is this the sphere, did it move,"
+            " is the probe where it is said to be, is its noise larger than was given?"
+        )
+    return ratio
+
+
+def _what_changed(change: Change) -> str:
+    if change.kind == "drift":
+        return "the sphere drifts from view to view: did it move, does the cell still warm up?"
+    if change.kind == "step":
+        return f"the sphere is elsewhere from view {change.group + 1} on: did it move?"
+    return (
+        f"view {change.group + 1} does not agree with the others: did it move in that view, is its flange pose right?"
+    )
+
+
+def _beyond_the_plane(views: Views, fit: ProbeFit) -> FloatArray:
+    """Return T_FS shifted so that the sphere is as far on the other side of the laser's plane as it is on this one.
+
+    Where the line always passes the sphere on the same side, that place fits as well.
+    """
+    in_F = np.einsum("nji,nj->ni", views.R, fit.centre - views.t)
+    aside_mm = float(np.mean((in_F - fit.T_FS[:3, 3]) @ fit.T_FS[:3, 1]))
+    mirrored = fit.T_FS.copy()
+    mirrored[:3, 3] += 2.0 * aside_mm * fit.T_FS[:3, 1]
+    return mirrored
+
+
+def _rival(found: Sequence[ProbeFit], best: ProbeFit) -> str | None:
+    """Return how far another minimum is that fits as well as the best one, or None."""
     as_good = _RIVAL_RATIO * best.rms_mm + 1e-6
-    rivals = (_apart_deg(end, best) for end in found if end.rms_mm < as_good)
-    return max((apart for apart in rivals if apart > _SAME_DEG), default=None)
+    rivals = [_apart(end, best) for end in found if end.rms_mm < as_good and _are_apart(end, best)]
+    if not rivals:
+        return None
+    angle_deg, distance_mm = max(rivals)
+    return f"{angle_deg:.0f} deg apart" if angle_deg > _SAME_DEG else f"{distance_mm:.1f} mm apart"
 
 
-def _apart_deg(one: "_Fit", other: "_Fit") -> float:
-    return float(np.degrees(Rotation.from_matrix(one.T_FS[:3, :3].T @ other.T_FS[:3, :3]).magnitude()))
+def _apart(one: ProbeFit, other: ProbeFit) -> tuple[float, float]:
+    """Return how far two placements are apart: angle (deg) and distance (mm)."""
+    turn = Rotation.from_matrix(one.T_FS[:3, :3].T @ other.T_FS[:3, :3])
+    return float(np.degrees(turn.magnitude())), float(np.linalg.norm(one.T_FS[:3, 3] - other.T_FS[:3, 3]))
+
+
+def _are_apart(one: ProbeFit, other: ProbeFit) -> bool:
+    angle_deg, distance_mm = _apart(one, other)
+    return angle_deg > _SAME_DEG or distance_mm > _SAME_MM
 
 
 def cube_turns(T_FS: FloatArray) -> Iterator[FloatArray]:
@@ -121,7 +228,7 @@ def cube_turns(T_FS: FloatArray) -> Iterator[FloatArray]:
             yield turned
 
 
-def _check_views(T_BF: FloatArray, points_S: Sequence[FloatArray]) -> None:
+def _check_views(T_BF: FloatArray, points_S: Sequence[FloatArray], radius_mm: float) -> None:
     if len(T_BF) != len(points_S) or len(T_BF) < _FEWEST_POSES:
         raise CalibrationError(
             f"there are {len(T_BF)} flange poses and {len(points_S)} views of the sphere;"
@@ -130,81 +237,30 @@ def _check_views(T_BF: FloatArray, points_S: Sequence[FloatArray]) -> None:
     short = [number for number, view in enumerate(points_S, 1) if len(view) < 3]
     if short:
         raise CalibrationError(f"view {short[0]} of the sphere has fewer than 3 points; look at it anew")
+    if not (np.isfinite(T_BF).all() and all(np.isfinite(view).all() for view in points_S)):
+        raise CalibrationError("a flange pose or a point of the sphere is not a finite number")
+    width_mm = float(np.median([np.linalg.norm(np.ptp(view, axis=0)) for view in points_S]))
+    if not _NARROWEST * radius_mm < width_mm < _WIDEST * radius_mm:
+        raise CalibrationError(
+            f"the views of the sphere are {width_mm:.3g} wide, and its radius is {radius_mm:g};"
+            " points, flange poses and radius must all be in mm"
+        )
 
 
-@dataclass(frozen=True, eq=False)
-class _Views:
-    """The points of all views, one row each, with the flange pose of their view."""
-
-    R: FloatArray
-    t: FloatArray
-    points: FloatArray
-
-    @classmethod
-    def of(cls, T_BF: FloatArray, points_S: Sequence[FloatArray]) -> "_Views":
-        view = np.repeat(np.arange(len(T_BF)), [len(points) for points in points_S])
-        return cls(T_BF[view, :3, :3], T_BF[view, :3, 3], np.concatenate(list(points_S)))
+def _covariance(fit: ProbeFit, weights: FloatArray) -> FloatArray:
+    """Return the covariance of the unknowns; infinite where the views do not determine them."""
+    weighted = weights[:, np.newaxis] * fit.jacobian
+    information = weighted.T @ weighted
+    scale = 1.0 / np.sqrt(np.diag(information))
+    scaled = information * scale * scale[:, np.newaxis]
+    if not np.isfinite(scaled).all() or np.linalg.cond(scaled) > 1e13:
+        return np.full_like(information, np.inf)
+    return np.asarray(np.linalg.inv(scaled) * scale * scale[:, np.newaxis])
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    T_FS: FloatArray
-    centre: FloatArray
-    residuals: FloatArray
-    jacobian: FloatArray
-
-    @property
-    def rms_mm(self) -> float:
-        return float(np.sqrt(np.mean(self.residuals**2)))
-
-
-def _fit(views: _Views, radius_mm: float, guess: FloatArray, evaluations: int | None = None) -> _Fit:
-    """Return where the nine unknowns come to from a guess of T_FS: turn (rad) and shift of the probe, sphere centre."""
-
-    def placed(unknown: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the points turned as they are on the flange, before the probe's shift; and in the base."""
-        turned = views.points @ (Rotation.from_rotvec(unknown[:3]).as_matrix() @ guess[:3, :3]).T
-        in_base = np.einsum("nij,nj->ni", views.R, turned + unknown[3:6]) + views.t
-        return turned, in_base
-
-    def residuals(unknown: FloatArray) -> FloatArray:
-        return np.asarray(np.linalg.norm(placed(unknown)[1] - unknown[6:], axis=1) - radius_mm)
-
-    def jacobian(unknown: FloatArray) -> FloatArray:
-        turned, in_base = placed(unknown)
-        radial = in_base - unknown[6:]
-        radial /= np.linalg.norm(radial, axis=1, keepdims=True)
-        on_flange = np.einsum("nji,nj->ni", views.R, radial)
-        turning = np.cross(turned, on_flange) @ _left_jacobian(unknown[:3])
-        return np.column_stack((turning, on_flange, -radial))
-
-    in_base = placed(np.concatenate((np.zeros(3), guess[:3, 3], np.zeros(3))))[1]
-    start = np.concatenate((np.zeros(3), guess[:3, 3], in_base.mean(axis=0)))
-    end = least_squares(residuals, start, jacobian, method="lm", max_nfev=evaluations)
-    T_FS = np.eye(4)
-    T_FS[:3, :3] = Rotation.from_rotvec(end.x[:3]).as_matrix() @ guess[:3, :3]
-    T_FS[:3, 3] = end.x[3:6]
-    return _Fit(T_FS, end.x[6:], end.fun, np.asarray(end.jac))
-
-
-def _left_jacobian(turn: FloatArray) -> FloatArray:
-    """Return how a small change of a rotation vector turns what it has turned (the left Jacobian of SO(3))."""
-    angle = float(np.linalg.norm(turn))
-    x, y, z = turn
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    if angle < 1e-6:
-        return np.eye(3) + 0.5 * K
-    first, second = (1.0 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
-    return np.asarray(np.eye(3) + first * K + second * K @ K)
-
-
-def _uncertainty(fit: _Fit) -> tuple[float, float]:
-    """Return the standard deviations of the worst coordinate (mm) and the worst angle (deg) of T_FS."""
-    freedom = max(1, len(fit.residuals) - fit.jacobian.shape[1])
-    variance = float(np.sum(fit.residuals**2)) / freedom
-    try:
-        covariance = variance * np.linalg.inv(fit.jacobian.T @ fit.jacobian)
-    except np.linalg.LinAlgError:
-        return np.inf, np.inf
-    deviations = np.sqrt(np.abs(np.diag(covariance)))
-    return float(deviations[3:6].max()), float(np.degrees(deviations[:3].max()))
+def _point_error_mm(fit: ProbeFit, covariance: FloatArray) -> float:
+    """Return how far (rms, 1 sigma) the uncertainty moves a point in the middle of the probe's range."""
+    x, y, z = _DEPTH_MM * fit.T_FS[:3, 2]
+    turning = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+    moves = np.column_stack((turning, np.eye(3)))
+    return float(np.sqrt(np.trace(moves @ covariance[:6, :6] @ moves.T)))

@@ -10,7 +10,7 @@ from planner.cell.cell import placement
 from planner.cell.scan_path import looking_at
 from planner.geometry.transforms import rigid_inverse, rotations_z
 from planner.scanning.alignment import Calibration
-from planner.scanning.calibration import AxisCalibration, calibrate_table_axis, sphere_centre
+from planner.scanning.calibration import AxisCalibration, PartSize, calibrate_table_axis, fit_sphere
 from planner.scanning.probe import LaserProbe
 from planner.scanning.probe_calibration import ProbeCalibration, calibrate_probe
 
@@ -88,7 +88,9 @@ def views_of(centre_B: FloatArray, count: int, probe: LaserProbe) -> FloatArray:
     return poses
 
 
-def calibrate_cell(true: Calibration, nominal: Calibration, probe: LaserProbe, seed: int) -> CellCalibration:
+def calibrate_cell(
+    true: Calibration, nominal: Calibration, probe: LaserProbe, seed: int, part: PartSize | None = None
+) -> CellCalibration:
     """Return what the two calibrations come to on a cell, from simulated measurements with the probe's noise.
 
     Args:
@@ -96,11 +98,13 @@ def calibrate_cell(true: Calibration, nominal: Calibration, probe: LaserProbe, s
         nominal: What is known beforehand.
         probe: The probe.
         seed: Chooses its noise.
+        part: What will be scanned.
     """
     rng = np.random.default_rng((seed, 8))
+    noise_mm = max(probe.noise_mm, 1e-3)
     centre = (true.T_BT @ np.array((*_SEAT_T_MM, 1.0)))[:3]
     seen = sweep(probe, views_of(centre, 20, probe), true.T_FS, centre, rng)
-    on_flange = calibrate_probe(seen.T_BF, seen.points_S, _RADIUS_MM, nominal.T_FS, 3.0 * max(probe.noise_mm, 1e-3))
+    on_flange = calibrate_probe(seen.T_BF, seen.points_S, _RADIUS_MM, nominal.T_FS, noise_mm)
 
     angles_deg = np.arange(_TABLE_ANGLES) * 360.0 / _TABLE_ANGLES
     centres = []
@@ -109,6 +113,9 @@ def calibrate_cell(true: Calibration, nominal: Calibration, probe: LaserProbe, s
         views = sweep(probe, views_of(turned, 3, probe), true.T_FS, turned, rng)
         T_BS = views.T_BF @ on_flange.T_FS
         in_base = [points @ T[:3, :3].T + T[:3, 3] for T, points in zip(T_BS, views.points_S, strict=True)]
-        centres.append(sphere_centre(np.concatenate(in_base), _RADIUS_MM))
-    axis = calibrate_table_axis(np.array(centres), angles_deg, nominal.T_BT)
+        centres.append(fit_sphere(np.concatenate(in_base), _RADIUS_MM, noise_mm))
+    centre_noise_mm = float(np.sqrt(np.mean([centre.deviations_mm**2 for centre in centres])))
+    axis = calibrate_table_axis(
+        np.array([each.centre for each in centres]), angles_deg, nominal.T_BT, noise_mm=centre_noise_mm, part=part
+    )
     return CellCalibration(axis, on_flange, Calibration(on_flange.T_FS, axis.T_BT, nominal.T_TW))

@@ -66,9 +66,18 @@ def _calibration(knowledge: Knowledge) -> dict[str, Any]:
         return placements | {"exact": True}
     return placements | {
         "exact": False,
-        "table_axis": {"rms_mm": axis.rms_mm},
+        "table_axis": {
+            "rms_mm": axis.rms_mm,
+            "uncertainty_mm": axis.uncertainty_mm,
+            "uncertainty_deg": axis.uncertainty_deg,
+            "point_error_mm": axis.point_error_mm,
+        },
         "probe": {
             "rms_mm": probe.rms_mm,
+            "noise_ratio": probe.noise_ratio,
+            "fitted_radius_mm": probe.fitted_radius_mm,
+            "radius_uncertainty_mm": probe.radius_uncertainty_mm,
+            "point_error_mm": probe.point_error_mm,
             "uncertainty_mm": probe.uncertainty_mm,
             "uncertainty_deg": probe.uncertainty_deg,
             "starts": probe.starts,

@@ -4,9 +4,11 @@ from collections import Counter
 from collections.abc import Iterator
 
 from planner.page import heading, note, page, picture, table, verdict
+from planner.scanning.calibration import AxisCalibration
 from planner.scanning.coverage import REASONS
 from planner.scanning.error_account import Account, Contribution
 from planner.scanning.probe import Sight
+from planner.scanning.probe_calibration import ProbeCalibration
 from planner.scanning.scan_plots import STATE_NAMES, account_figure, cloud_figure, coverage_figure
 from planner.scanning.scan_run import COVERED_MM, Scanned
 
@@ -123,15 +125,18 @@ def _calibration(scanned: Scanned) -> str:
     axis, probe = scanned.knowledge.axis, scanned.knowledge.probe
     if axis is None or probe is None:
         return note("The placements of the scan file were taken as exactly known.")
+    wrong = f"{probe.wrong_starts} of {probe.starts} starts ended in a false minimum"
+    radius = f"the sphere's radius fits as {probe.fitted_radius_mm:.4f} ± {probe.radius_uncertainty_mm:.4f} mm"
     rows = [
-        ("table axis", _um(axis.rms_mm), f"{len(axis.residuals_mm)} sphere centres", ""),
-        (
-            "probe on the flange", _um(probe.rms_mm), f"{len(probe.residuals_mm):,} points",
-            f"{_um(probe.uncertainty_mm)} µm, {1e3 * probe.uncertainty_deg:.1f} mdeg"
-            f"; {probe.wrong_starts} of {probe.starts} starts ended in a false minimum",
-        ),
+        ("table axis", _um(axis.rms_mm), f"{len(axis.residuals_mm)} sphere centres", *_uncertainty(axis), ""),
+        ("probe on the flange", _um(probe.rms_mm), f"{len(probe.residuals_mm):,} points", *_uncertainty(probe),
+         f"residual {probe.noise_ratio:.2f} times the noise; {radius}; {wrong}"),
     ]  # fmt: skip
-    return table(("", "residual (µm, rms)", "from", "uncertainty (1 sigma)"), rows, words=True)
+    return table(("", "residual (µm, rms)", "from", "uncertainty (1 sigma)", "moves a point by", ""), rows, words=True)
+
+
+def _uncertainty(found: AxisCalibration | ProbeCalibration) -> tuple[str, str]:
+    return f"{_um(found.uncertainty_mm)} µm, {1e3 * found.uncertainty_deg:.1f} mdeg", f"{_um(found.point_error_mm)} µm"
 
 
 def _profiles(scanned: Scanned) -> Iterator[tuple[str, str]]:

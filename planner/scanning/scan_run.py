@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 
 from planner.arrays import FloatArray
-from planner.cell.cell import Cell, placement
+from planner.cell.cell import placement
 from planner.cell.scan import Scan
 from planner.errors import PlannerError
 from planner.execution.execute import Settings
@@ -33,7 +33,7 @@ from planner.planning.planners import DEFAULT_PLANNER, PLANNERS
 from planner.planning.problem import Problem
 from planner.progress import Progress
 from planner.scanning.alignment import Calibration, aligned, probe_poses
-from planner.scanning.calibration import AxisCalibration
+from planner.scanning.calibration import AxisCalibration, PartSize
 from planner.scanning.coverage import Coverage
 from planner.scanning.error_account import Account, Chain, Samples, account
 from planner.scanning.latched_run import LatchedRun, TriggerConditions, run_latched
@@ -96,14 +96,20 @@ class Knowledge:
     probe: ProbeCalibration | None = None
 
     @classmethod
-    def of(cls, cell: Cell, probe: LaserProbe, exact: bool, seed: int) -> Self:
+    def of(cls, scan: Scan, probe: LaserProbe, exact: bool, seed: int) -> Self:
         """Return the cell's own placements, or what the calibrations find from a drawing that is some mm off."""
-        true = Calibration.of(cell)
+        true = Calibration.of(scan.cell)
         if exact:
             return cls(true)
         off = placement(1.0, -1.5, 0.0, 0.0, 0.0, 0.0) @ placement(0.0, 0.0, 0.0, 30.0, 0.5, -30.0)
-        found = calibrate_cell(true, Calibration(true.T_FS @ off, true.T_BT, true.T_TW), probe, seed)
+        found = calibrate_cell(true, Calibration(true.T_FS @ off, true.T_BT, true.T_TW), probe, seed, _part_size(scan))
         return cls(found.calibration, found.axis, found.probe)
+
+
+def _part_size(scan: Scan) -> PartSize:
+    """Return the cylinder about the table's axis that holds the workpiece."""
+    on_table = np.asarray(scan.mesh.vertices) @ scan.cell.T_TW[:3, :3].T + scan.cell.T_TW[:3, 3]
+    return PartSize(float(np.hypot(on_table[:, 0], on_table[:, 1]).max()), float(on_table[:, 2].max()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +217,7 @@ def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: Progre
         raise ScanError(
             f"a rate of {options.triggers.rate_hz:g} profiles a second is beyond the probe's {probe.line_rate_hz:g}"
         )
-    knowledge = Knowledge.of(scan.cell, probe, options.exact_calibration, options.seed)
+    knowledge = Knowledge.of(scan, probe, options.exact_calibration, options.seed)
     planned = plan_scan(scan, options.configuration, options.angle_count, progress)
     out.mkdir(parents=True, exist_ok=True)
     run = run_on_port(planned, options, progress)

@@ -11,7 +11,7 @@ from importlib import import_module
 
 from tools.command_line import ended
 
-SUBJECTS = ("emulator", "identify", "map", "planner", "scan", "stop", "stream")
+SUBJECTS = ("calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
