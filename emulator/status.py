@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 from emulator.config import TableConfig
+from emulator.encoder import Encoder
 from emulator.firmware import STATE_NAMES
 from emulator.fixed_point import POSITION_BITS, SPEED_BITS, from_fixed
 from emulator.pid import RAMP
@@ -30,6 +31,8 @@ class TableStatus(NamedTuple):
     transmit_queue: int  # bytes that have not left
     lost_bytes: int
     load_torque_Nm: float
+    shaft_deg: float  # what an encoder without steps would read on the motor's shaft
+    gap_deg: float  # by how much the shaft is ahead of the table: half the backlash at most, either way
 
 
 def table_status(
@@ -37,6 +40,7 @@ def table_status(
     state: TableState,
     uart: Uart,
     *,
+    encoder: Encoder,
     tick: int,
     latched_count: int,
     load_torque_Nm: float,
@@ -64,4 +68,7 @@ def table_status(
         transmit_queue=uart.transmit_count,
         lost_bytes=uart.lost_bytes,
         load_torque_Nm=load_torque_Nm,
+        # A count stands for all angles from its edge to the next, so that its middle is what it means.
+        shaft_deg=(drive.angle_rad * encoder.count_rad + encoder.phase - 0.5) / count_deg,
+        gap_deg=math.degrees(drive.angle_rad / config.gears.ratio - drive.table_angle_rad),
     )

@@ -168,6 +168,7 @@ class Table:
             self.config,
             self._state,
             self._serial.uart,
+            encoder=self._constants.encoder,
             tick=self.tick,
             latched_count=self._registers.latched_count,
             load_torque_Nm=self._load_torque_Nm,

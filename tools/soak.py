@@ -131,7 +131,8 @@ def soak_clients(count: float, seed: int) -> Soak:
 
 def soak_wrap(count: float, seed: int) -> Soak:
     """Let the counter run over its end in motion, both ways, again and again: the motion goes on."""
-    table = Table(load_config().with_serial(baud=0), seed)
+    config = load_config().with_serial(baud=0)
+    table, counts_per_deg = Table(config, seed), config.counts_per_turn / 360.0
     faults = []
     for index in range(round(count)):
         direction = 1 if index % 2 == 0 else -1
@@ -140,7 +141,7 @@ def soak_wrap(count: float, seed: int) -> Soak:
         table.receive(b"S 40\rA 100\rR %d\r" % (20 * direction))
         table.advance(3000)
         status = table.status()
-        travelled = status.encoder_deg - start.encoder_deg + direction * 2**32 / 512
+        travelled = status.encoder_deg - start.encoder_deg + direction * 2**32 / counts_per_deg
         turned = status.true_deg - start.true_deg
         if abs(travelled - 20 * direction) > 0.05 or abs(turned - 20 * direction) > 0.3:
             faults.append(f"run {index}: {travelled:.3f} deg counted, {turned:.3f} deg turned, of {20 * direction}")

@@ -3,9 +3,11 @@
 A scan's own profiles are aligned again and again, each time with one contribution made perfect, or all but one. The
 chain of the table's angle, from the truth to the wire:
 
-    true angle at the exposure -> [timing] -> at the edge -> [encoder] -> a count -> [backlash] -> [rounding] -> wire
+    true angle at the exposure -> [timing] -> at the edge -> [backlash] -> motor -> [encoder] -> count
+        -> [rounding] -> wire
 
-With all switched on the angle is exactly that of the wire; with all off it is exactly the true one.
+Each step's error is the difference of two angles of that table itself, so that nothing is assumed of its encoder or
+gears. With all switched on the angle is exactly that of the wire; with all off it is exactly the true one.
 """
 
 from collections.abc import Callable, Collection
@@ -21,8 +23,6 @@ from planner.scanning.alignment import Calibration, aligned, probe_poses
 from planner.scanning.latched_run import LatchedRun
 from planner.scanning.probe import Profiles
 
-# The table's encoder: 384 counts a motor turn, 480 motor turns a table turn.
-COUNTS_PER_DEG = 512.0
 # At most so many points are looked at, and at least half as many of a larger cloud: their sigma is good to 0.5 %.
 SAMPLES = 40_000
 
@@ -160,12 +160,12 @@ class Chain:
         run = self.run
         angle = run.edge_deg if Part.TIMING in on else run.true_deg
         if run.tells_truth:
-            # How far the teeth are apart, to a count.
-            gap = run.latched_deg - counted_deg(run.edge_deg)
-            angle = counted_deg(angle) if Part.ENCODER in on else angle
-            angle = angle + gap if Part.BACKLASH in on else angle
-            # The wire's error is taken as it was, so that all parts together are the wire.
-            angle = angle + (run.angles_deg - run.latched_deg) if Part.ROUNDING in on else angle
+            steps = {
+                Part.BACKLASH: run.shaft_deg - run.edge_deg,
+                Part.ENCODER: run.latched_deg - run.shaft_deg,
+                Part.ROUNDING: run.angles_deg - run.latched_deg,
+            }
+            angle = angle + sum((error for part, error in steps.items() if part in on), np.zeros_like(angle))
         return angle
 
     def poses(self, on: Collection[Part]) -> FloatArray:
@@ -173,11 +173,6 @@ class Chain:
         joints = self.run.joints_deg if Part.TIMING in on else self.run.true_joints_deg
         placements = self.known if Part.CALIBRATION in on else self.true
         return probe_poses(placements, self.flange_poses(joints), self.angles_deg(on))
-
-
-def counted_deg(angles_deg: FloatArray) -> FloatArray:
-    """Return angles as an encoder without backlash would count them."""
-    return np.asarray(np.round(angles_deg * COUNTS_PER_DEG) / COUNTS_PER_DEG)
 
 
 def account(chain: Chain, samples: Profiles, mesh: trimesh.Trimesh, wire_step_deg: float) -> Account:

@@ -19,7 +19,7 @@ from planner.execution.table_motion import Phase, TableMotion
 from planner.planning.plan import Plan
 from planner.progress import Progress
 from planner.scanning.latching import Drop, Pairing, RobotLatch, TableReading, Tolerances, Trigger, pair
-from planner.scanning.trigger_line import TriggerFaults, TriggerLine, robot_latch_times_s
+from planner.scanning.trigger_line import TableTruth, TriggerFaults, TriggerLine, robot_latch_times_s
 from planner.table.motion import Limits
 from planner.table.wire import Wire
 from protocol import TableClient
@@ -62,10 +62,11 @@ class LatchedRun:
         joints_deg: `(n, 6)` as latched.
         angles_deg: `(n,)` table angles as they came over the wire.
         true_joints_deg: `(n, 6)` when the profile was taken.
-        true_deg: `(n,)` the table's own angle then; where the port does not tell, that of the wire.
+        true_deg: `(n,)` the table's own angle then, from its encoder's zero; that of the wire where it is unknown.
         edge_deg: `(n,)` the table's own angle when its trigger arrived, or as `true_deg`.
+        shaft_deg: `(n,)` the motor's angle then, over the gear ratio, or as `true_deg`.
         latched_deg: `(n,)` the encoder then, before rounding, or as `true_deg`.
-        tells_truth: Whether the port told these three.
+        tells_truth: Whether the port gives these four.
         triggers: How many profiles the probe took along the path.
         dropped: Why the other profiles have no pose, by their number.
         failure: Why the motion ended early; None when it came to its end.
@@ -78,6 +79,7 @@ class LatchedRun:
     true_joints_deg: FloatArray
     true_deg: FloatArray
     edge_deg: FloatArray
+    shaft_deg: FloatArray
     latched_deg: FloatArray
     tells_truth: bool
     triggers: int
@@ -146,7 +148,9 @@ def run_latched(
     record = execute(table, motion, limits, wire, settings, line, progress)
     line.stop()
     times_s = line.times_s() - record.origin_s
-    triggers = [Trigger(k, time_s) for k, time_s in enumerate(times_s.tolist()) if motion.is_scanning(time_s)]
+    # Those in pauses and after the end overwrite the table's latch as well.
+    triggers = [Trigger(k, time_s) for k, time_s in enumerate(times_s.tolist())]
+    on_path = {trigger.number for trigger in triggers if motion.is_scanning(trigger.time_s)}
     robot = robot_motion(motion, joints_deg)
     latches = _robot_latches(robot, times_s, conditions)
     readings = list(_readings(record, wire))
@@ -154,21 +158,22 @@ def run_latched(
     tolerances = Tolerances(table_deg=_TRACKING_DEG + 0.5 * wire.quantum)
     pairing = pair(
         triggers, latches, readings, lambda at_s: motion.state_at(at_s - settings.encoder_delay_s).angle_deg, tolerances
-    )
+    ).only(on_path)
     if not len(pairing.numbers):
-        raise NothingScannedError(_why_nothing(triggers, pairing.dropped, record.failure))
-    true_deg, edge_deg, latched_deg, tells_truth = _truth(line, pairing)
+        raise NothingScannedError(_why_nothing(len(on_path), pairing.dropped, record.failure))
+    truth = _truth(line, pairing)
     return LatchedRun(
         numbers=pairing.numbers,
         times_s=times_s[pairing.numbers],
         joints_deg=pairing.joints_deg,
         angles_deg=pairing.angles_deg,
         true_joints_deg=_joints_at(robot, times_s[pairing.numbers]),
-        true_deg=true_deg,
-        edge_deg=edge_deg,
-        latched_deg=latched_deg,
-        tells_truth=tells_truth,
-        triggers=len(triggers),
+        true_deg=truth.exposure_deg,
+        edge_deg=truth.edge_deg,
+        shaft_deg=truth.shaft_deg,
+        latched_deg=truth.latched_deg,
+        tells_truth=line.truth() is not None,
+        triggers=len(on_path),
         dropped=pairing.dropped,
         failure=record.failure,
     )
@@ -180,15 +185,20 @@ def _robot_latches(robot: RobotMotion, times_s: FloatArray, conditions: TriggerC
     return [RobotLatch(time_s, joints) for time_s, joints in zip(at_s, _joints_at(robot, at_s), strict=True)]
 
 
-def _truth(line: TriggerLine, pairing: Pairing) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
-    """Return the table's angle at the exposures and at the edges, the encoder there, and whether the port told them."""
-    truth = line.truth()
+def _truth(line: TriggerLine, pairing: Pairing) -> TableTruth:
+    """Return what is true of the table at the profiles' triggers; all as on the wire where the port does not tell."""
+    truth, wire_deg = line.truth(), pairing.angles_deg
     if truth is None:
-        return pairing.angles_deg, pairing.angles_deg, pairing.angles_deg, False
-    true_deg, edge_deg, latched_deg = (part[pairing.numbers] for part in truth)
+        return TableTruth(wire_deg, wire_deg, wire_deg, wire_deg)
+    exposure_deg, edge_deg, shaft_deg, latched_deg = (part[pairing.numbers] for part in truth)
     # The table may have missed a trigger in such slow motion that nobody could tell.
-    edge_deg, latched_deg = np.where(np.isnan(latched_deg), (true_deg, pairing.angles_deg), (edge_deg, latched_deg))
-    return true_deg, edge_deg, latched_deg, True
+    missed = np.isnan(latched_deg)
+    return TableTruth(
+        exposure_deg,
+        np.where(missed, exposure_deg, edge_deg),
+        np.where(missed, exposure_deg, shaft_deg),
+        np.where(missed, wire_deg, latched_deg),
+    )
 
 
 def _readings(record: Record, wire: Wire) -> Iterator[TableReading]:
@@ -206,11 +216,11 @@ def _joints_at(robot: RobotMotion, times_s: FloatArray) -> FloatArray:
     return np.column_stack([np.interp(times_s, robot.times_s, robot.joints_deg[:, j]) for j in range(6)])
 
 
-def _why_nothing(triggers: list[Trigger], dropped: dict[int, Drop], failure: str | None) -> str:
+def _why_nothing(triggers: int, dropped: dict[int, Drop], failure: str | None) -> str:
     if failure is not None:
         return f"nothing was scanned: {failure}"
     if not triggers:
         return "nothing was scanned: the probe took no profile; its rate is too low for a scan this short"
     reasons = [drop.value for drop in dropped.values()]
     most = max(set(reasons), key=reasons.count)
-    return f"nothing was scanned: all {len(triggers)} profiles were dropped, most because {most}"
+    return f"nothing was scanned: all {triggers} profiles were dropped, most because {most}"

@@ -7,7 +7,7 @@ the table has missed that trigger, or heard one that was none. A profile that mi
 takes another's.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from enum import Enum
 from typing import NamedTuple
 
@@ -75,6 +75,12 @@ class Pairing(NamedTuple):
     joints_deg: FloatArray
     angles_deg: FloatArray
     dropped: dict[int, Drop]
+
+    def only(self, numbers: Collection[int]) -> "Pairing":
+        """Return the pairing of some of the triggers."""
+        kept = np.isin(self.numbers, list(numbers))
+        dropped = {number: why for number, why in self.dropped.items() if number in numbers}
+        return Pairing(self.numbers[kept], self.joints_deg[kept], self.angles_deg[kept], dropped)
 
 
 def pair(

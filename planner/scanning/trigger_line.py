@@ -34,16 +34,21 @@ class TriggerFaults(NamedTuple):
 
 
 class TableTruth(NamedTuple):
-    """What nobody on the wire knows of the table, `(n,)` each, by number of the trigger; NaN where there is nothing.
+    """What is not visible on the wire, `(n,)` each, by number of the trigger; NaN where there is nothing.
+
+    The table's own angle has the zero of its encoder: where the middle of count 0 is, and the teeth are in the middle
+    of the backlash.
 
     Attributes:
         exposure_deg: The table's own angle when the profile was taken.
         edge_deg: The same when the trigger's edge arrived at the table.
+        shaft_deg: The motor's angle at that edge, over the gear ratio.
         latched_deg: The encoder at that edge, with all its digits.
     """
 
     exposure_deg: FloatArray
     edge_deg: FloatArray
+    shaft_deg: FloatArray
     latched_deg: FloatArray
 
 
@@ -91,7 +96,8 @@ class ProbeOnPort:
         self._start_s = self._end_s = float("inf")
         self._is_running = False
         self._first_tick = int(table.tick)
-        self._angles_deg = array("d", [table.status().true_deg])
+        status = table.status()
+        self._shaft_deg, self._gap_deg = array("d", [status.shaft_deg]), array("d", [status.gap_deg])
         self._edges_s: dict[int, float] = {}
         self._latched_deg: dict[int, float] = {}
         self._arriving: list[int] = []
@@ -126,11 +132,17 @@ class ProbeOnPort:
     def truth(self) -> TableTruth:
         """Return where the table truly was at each trigger."""
         times_s = self.times_s()
-        ticks = self._first_tick + np.arange(len(self._angles_deg))
+        ticks = self._first_tick + np.arange(len(self._shaft_deg))
         edges_s = np.array([self._edges_s.get(number, np.nan) for number in range(len(times_s))])
         latched_deg = np.array([self._latched_deg.get(number, np.nan) for number in range(len(times_s))])
-        exposure_deg, edge_deg = (np.interp(at * self._tick_hz, ticks, self._angles_deg) for at in (times_s, edges_s))
-        return TableTruth(exposure_deg, edge_deg, latched_deg)
+        shaft_deg = np.asarray(self._shaft_deg)
+        table_deg = shaft_deg - np.asarray(self._gap_deg)
+        return TableTruth(
+            exposure_deg=np.interp(times_s * self._tick_hz, ticks, table_deg),
+            edge_deg=np.interp(edges_s * self._tick_hz, ticks, table_deg),
+            shaft_deg=np.interp(edges_s * self._tick_hz, ticks, shaft_deg),
+            latched_deg=latched_deg,
+        )
 
     def _edges(self) -> Iterator[tuple[float, int | None]]:
         """Yield the edges that the table hears, with the number of their trigger where they have one."""
@@ -144,7 +156,8 @@ class ProbeOnPort:
                 yield time_s + 0.5 * self._period_s, None
 
     def _after_tick(self, status: Any, _heard: bytes, _said: bytes) -> None:  # noqa: ANN401 - as above
-        self._angles_deg.append(status.true_deg)
+        self._shaft_deg.append(status.shaft_deg)
+        self._gap_deg.append(status.gap_deg)
         for number in self._arriving:
             self._latched_deg[number] = status.latched_deg
         self._arriving.clear()

@@ -39,11 +39,11 @@ def table_behind(port: object) -> Any:  # noqa: ANN401 - the planner knows nothi
 
 
 def latched_run(
-    conditions: TriggerConditions, plan: Plan | None = None, decimals: int = 1, url: str = "emulator://"
+    conditions: TriggerConditions, plan: Plan | None = None, decimals: int = 1, query: str = ""
 ) -> LatchedRun:
     """Return what was latched along a plan on a table of its own."""
     plan, wire = plan or swinging_plan(), Wire(decimals)
-    port = open_port(f"{url}?decimals={decimals}", wire.baud, 0.5)
+    port = open_port(f"emulator://?decimals={decimals}{query}", wire.baud, 0.5)
     with TableClient(port, 0.5, decimals) as table:
         line = ProbeOnPort(
             table_behind(port), conditions.rate_hz, conditions.delay_s, conditions.faults, conditions.seed

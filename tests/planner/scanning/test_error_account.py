@@ -12,7 +12,7 @@ from planner.geometry.ray_casting import RayCaster
 from planner.geometry.transforms import rigid_inverse
 from planner.kinematics.arm import Arm
 from planner.scanning.alignment import Calibration, probe_poses
-from planner.scanning.error_account import Account, Chain, Part, Samples, account, counted_deg, signed_distances_mm
+from planner.scanning.error_account import Account, Chain, Part, Samples, account, signed_distances_mm
 from planner.scanning.latched_run import LatchedRun
 from planner.scanning.probe import LaserProbe, measure
 
@@ -32,18 +32,21 @@ def poses_round_the_block() -> FloatArray:
     return looking_at(points, normals, np.tile((0.0, 0.0, 1.0), (PROFILES, 1)), 150.0)
 
 
-def made_up_chain(decimals: int, backlash_deg: float = 0.08, off_mm: float = 0.02) -> Chain:
+def made_up_chain(
+    decimals: int, backlash_deg: float = 0.08, off_mm: float = 0.02, counts_per_deg: float = 512.0
+) -> Chain:
     """Return a run whose errors are known, with poses in the place of joints: row k of `joints` is its number."""
     rng = np.random.default_rng(2)
     true_deg: FloatArray = rng.uniform(0.0, 360.0, PROFILES)
     edge_deg = true_deg + 0.001
-    latched_deg = np.asarray(np.floor((edge_deg - backlash_deg) * 512.0) / 512.0, dtype=np.float64)
+    shaft_deg = edge_deg - backlash_deg
+    latched_deg: FloatArray = np.round(shaft_deg * counts_per_deg) / counts_per_deg
     T_BF = CELL.goal_flange_poses(poses_round_the_block(), true_deg)[np.arange(PROFILES), np.arange(PROFILES)]
     numbers = np.tile(np.arange(PROFILES, dtype=np.float64)[:, np.newaxis], (1, 6))
     times_s = np.linspace(0.0, 24.0, PROFILES)
     run = LatchedRun(
         np.arange(PROFILES), times_s, numbers, latched_deg.round(decimals), numbers,
-        true_deg, edge_deg, latched_deg, True, PROFILES, {}, None,
+        true_deg, edge_deg, shaft_deg, latched_deg, True, PROFILES, {}, None,
     )  # fmt: skip
     known = replace(TRUE, T_FS=TRUE.T_FS @ placement(off_mm, 0.0, 0.0, 0.0, 0.0, 0.0))
     return Chain(run, TRUE, known, lambda joints: T_BF[joints[:, 0].astype(int)])
@@ -83,7 +86,7 @@ def test_the_parts_are_those_that_were_put_in() -> None:
     moved_mm = {part: share.displacement_mm for part, share in result.parts.items()}
     radius_mm = result.radius_mm
     assert moved_mm[Part.PROBE] == pytest.approx(0.025, rel=0.04)
-    assert moved_mm[Part.BACKLASH] == pytest.approx(math.radians(0.08 + 0.5 / 512.0) * radius_mm, rel=0.02)
+    assert moved_mm[Part.BACKLASH] == pytest.approx(math.radians(0.08) * radius_mm, rel=1e-6)
     assert moved_mm[Part.TIMING] == pytest.approx(math.radians(0.001) * radius_mm, rel=0.01)
     assert moved_mm[Part.ENCODER] == pytest.approx(math.radians(1.0 / 512.0) / math.sqrt(12.0) * radius_mm, rel=0.1)
     assert moved_mm[Part.CALIBRATION] == pytest.approx(0.02, rel=1e-6)
@@ -104,7 +107,7 @@ def test_with_three_decimals_no_backlash_and_exact_calibration_the_cloud_is_with
 def test_without_the_table_s_truth_its_parts_are_left_out() -> None:
     chain = made_up_chain(1)
     wire = chain.run.angles_deg
-    run = replace(chain.run, true_deg=wire, edge_deg=wire, latched_deg=wire, tells_truth=False)
+    run = replace(chain.run, true_deg=wire, edge_deg=wire, shaft_deg=wire, latched_deg=wire, tells_truth=False)
     assert set(accounted(replace(chain, run=run), 1).parts) == {Part.PROBE, Part.TIMING, Part.CALIBRATION}
 
 
@@ -131,8 +134,12 @@ def test_samples_are_an_even_choice_in_bounded_memory() -> None:
     assert (np.diff(rows) >= 0).all()
 
 
-def test_an_encoder_counts_512_steps_a_degree() -> None:
-    assert counted_deg(np.array([0.0, 1.0 / 512.0, 0.4 / 512.0])).tolist() == [0.0, 1.0 / 512.0, 0.0]
+@pytest.mark.parametrize("counts_per_deg", [16.0, 100.0, 512.0, 40_000.0])
+def test_encoder_and_backlash_are_those_of_the_table_whatever_its_counts(counts_per_deg: float) -> None:
+    result = accounted(made_up_chain(3, backlash_deg=0.0, counts_per_deg=counts_per_deg), 3)
+    step_mm = math.radians(1.0 / counts_per_deg) * result.radius_mm
+    assert result.parts[Part.ENCODER].displacement_mm == pytest.approx(step_mm / math.sqrt(12.0), rel=0.1)
+    assert result.parts[Part.BACKLASH].displacement_mm < 1e-9
 
 
 def test_the_arm_s_own_kinematics_serve_the_chain() -> None:

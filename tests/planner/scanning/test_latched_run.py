@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -45,6 +47,41 @@ def test_the_same_seed_gives_the_same_run_and_another_one_another(sound: Latched
     assert (again.joints_deg == sound.joints_deg).all()
     assert (again.angles_deg == sound.angles_deg).all()
     assert (other.joints_deg != sound.joints_deg).any()
+
+
+OTHER_TABLES = {
+    "as shipped": (96, 10.0, 1000),
+    "coarse encoder": (24, 10.0, 1000),
+    "fine encoder": (120, 10.0, 1000),
+    "no backlash": (96, 0.0, 1000),
+    "much backlash": (48, 40.0, 1000),
+    "coarse and no backlash": (12, 0.0, 1000),
+    "slow firmware": (48, 10.0, 500),
+}
+
+
+@pytest.mark.parametrize("name", OTHER_TABLES)
+def test_what_is_told_of_a_table_is_that_table_s(name: str, tmp_path: Path) -> None:
+    lines, backlash_arcmin, tick_hz = OTHER_TABLES[name]
+    config = tmp_path / "table.toml"
+    config.write_text(
+        f"[encoder]\nlines = {lines}\n[gears]\nbacklash_arcmin = {backlash_arcmin}\n[control]\ntick_hz = {tick_hz}\n"
+    )
+    run = latched_run(TriggerConditions(rate_hz=40.0), decimals=4, query=f"&config={config}")
+    assert run.failure is None
+    step_deg = 360.0 / (4 * lines * 480.0)  # four counts a line, before gears of 480:1
+    encoder_deg = run.latched_deg - run.shaft_deg
+    # Within a tick the shaft is followed by a straight line here, and by a parabola at the latch.
+    assert np.abs(encoder_deg).max() <= 0.5 * step_deg + 0.0015
+    assert np.std(encoder_deg) == pytest.approx(step_deg / np.sqrt(12.0), rel=0.2, abs=2e-4)
+    # The default encoder gives counts of 1/512 deg: the steps of the latch itself are those of this one.
+    steps = (run.latched_deg - run.latched_deg[0]) / step_deg
+    assert steps == pytest.approx(steps.round(), abs=1e-6)
+    gap_deg = run.shaft_deg - run.edge_deg
+    half_gap_deg = 0.5 * backlash_arcmin / 60.0
+    assert np.abs(gap_deg).max() <= half_gap_deg + 1e-9
+    assert np.sqrt(np.mean(gap_deg**2)) >= 0.8 * half_gap_deg  # in contact most of the time
+    assert np.abs(run.angles_deg - run.latched_deg).max() <= 0.5e-4 + 1e-9
 
 
 def kept_among(sound: LatchedRun, count: int) -> frozenset[int]:
