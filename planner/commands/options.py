@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from planner.cell.scan import shipped_scans
+from planner.execution.execute import Settings
 from planner.execution.run_on import DEFAULT_RUN_ON_DEG
 
 
@@ -67,6 +68,14 @@ def add_stand_in(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_lag(parser: argparse.ArgumentParser) -> None:
+    """Add the encoder's lag behind the reference, which the wire does not show."""
+    parser.add_argument(
+        "--lag", type=number(0.0, 1.0), default=Settings().lag_s, metavar="S",
+        help="lag of the encoder behind the table's reference (default %(default)s, that of the emulator)",
+    )  # fmt: skip
+
+
 def fresh_table(url: str, **wanted: int) -> str:
     """Return a port's URL; a table that `emulator://` makes gets what is wanted, unless told others."""
     if not url.startswith("emulator://"):
@@ -87,6 +96,21 @@ def whole_number(least: int, most: int) -> Callable[[str], int]:
         if not least <= number <= most:
             raise argparse.ArgumentTypeError(f"is {text}; allowed is a whole number from {least} to {most}")
         return number
+
+    return read
+
+
+def number(least: float, most: float) -> Callable[[str], float]:
+    """Return what reads a number within bounds."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = float("nan")
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"is {text}; allowed is a number from {least:g} to {most:g}")
+        return value
 
     return read
 

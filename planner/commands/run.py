@@ -43,9 +43,10 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="wait this long for a reply (default 1)",
     )
     parser.add_argument(
-        "--lead", type=float, default=Settings().lead_s, metavar="S",
+        "--lead", type=options.number(-1.0, 1.0), default=Settings().lead_s, metavar="S",
         help="send commands ahead by the encoder's lag behind the reference: 0.0035 for the stand-in (default 0)",
     )  # fmt: skip
+    options.add_lag(parser)
     parser.add_argument(
         "--tolerance", type=options.positive_number, default=DEFAULT_TOLERANCE_DEG, metavar="DEG",
         help="what the encoder may deviate at a location (default %(default)s)",
@@ -69,6 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
         timeout_s=arguments.timeout,
         lead_s=arguments.lead,
         run_on_deg=arguments.run_on,
+        lag_s=arguments.lag,
         tolerance_deg=arguments.tolerance,
         control=arguments.control,
         arm_is_away=arguments.arm_away,

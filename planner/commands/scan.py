@@ -37,6 +37,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )  # fmt: skip
     options.add_stand_in(parser)
     options.add_wire(parser)
+    options.add_lag(parser)
     parser.add_argument(
         "--rate", type=options.positive_number, default=TriggerConditions().rate_hz, metavar="HZ",
         help="profiles a second (default %(default)g)",
@@ -66,6 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
         port=options.fresh_table(arguments.port, decimals=arguments.decimals, seed=arguments.seed),
         baud=arguments.baud,
         decimals=arguments.decimals,
+        lag_s=arguments.lag,
         control=arguments.control,
         time_scale=arguments.time_scale,
         run_on_deg=arguments.run_on,

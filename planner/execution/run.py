@@ -41,6 +41,7 @@ class RunOptions(NamedTuple):
     timeout_s: float = 1.0
     lead_s: float = Settings().lead_s
     run_on_deg: float = DEFAULT_RUN_ON_DEG
+    lag_s: float = Settings().lag_s
     tolerance_deg: float = DEFAULT_TOLERANCE_DEG
     control: Path | None = None
     arm_is_away: bool = False
@@ -95,7 +96,7 @@ def run_plan(
         run_input = run_input.turned(turns)
         motion = TableMotion(run_input.plan, limits, options.pause_times)
         bring_to(table, motion.start_deg, limits, wire)
-        settings = Settings(lead_s=options.lead_s, run_on_deg=options.run_on_deg)
+        settings = Settings(lag_s=options.lag_s, lead_s=options.lead_s, run_on_deg=options.run_on_deg)
         record = execute(table, motion, limits, wire, settings, view, progress)
         duration = Duration(table.clock.now_s() - table_began_s, time.perf_counter() - wall_began_s)
     conditions = RunConditions(

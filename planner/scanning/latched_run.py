@@ -134,8 +134,8 @@ def run_latched(
         limits: Greatest S and A.
         wire: What the commands have to pass.
         conditions: How the probe fires.
-        settings: How the motion is run.
         progress: Called with the time of the motion and its end, in ms.
+        settings: How the motion is run.
 
     Raises:
         NothingScannedError: No profile is complete.

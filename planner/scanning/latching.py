@@ -15,6 +15,8 @@ import numpy as np
 
 from planner.arrays import FloatArray, IndexArray
 
+# Over which the planned speed is taken, and below which it shows no lag.
+_STEP_S, _SLOW_DEG_S = 0.005, 1.0
 # How many readings before and after tell how far the table is off its plan at a trigger.
 _NEIGHBOURS = 7
 
@@ -153,12 +155,33 @@ def _strays(
     planned_deg: Callable[[float], float],
     tolerance_deg: float,
 ) -> set[int]:
-    """Return the triggers whose reading is off the plan by another amount than the readings around it."""
+    """Return the triggers whose reading is off the plan by another amount than the readings around it.
+
+    How far this table lags behind its plan, more than the caller knows, is taken from the readings themselves.
+    """
     read = [trigger for trigger in triggers if trigger.number in readings]
     off_deg = np.array([readings[trigger.number] - planned_deg(trigger.time_s) for trigger in read])
+    speeds_deg_s = np.array(
+        [
+            (planned_deg(trigger.time_s + _STEP_S) - planned_deg(trigger.time_s - _STEP_S)) / (2.0 * _STEP_S)
+            for trigger in read
+        ]
+    )
+    off_deg = off_deg + _lag_s(off_deg, speeds_deg_s) * speeds_deg_s
     stray = set()
     for k, trigger in enumerate(read):
         around = off_deg[max(0, k - _NEIGHBOURS) : k + _NEIGHBOURS + 1]
         if abs(off_deg[k] - float(np.median(around))) > tolerance_deg:
             stray.add(trigger.number)
     return stray
+
+
+def _lag_s(off_deg: FloatArray, speeds_deg_s: FloatArray) -> float:
+    """Return by how much readings are late: the median of -off over speed, weighted by the speed."""
+    fast = np.abs(speeds_deg_s) > _SLOW_DEG_S
+    if not fast.any():
+        return 0.0
+    lags_s, weights = -off_deg[fast] / speeds_deg_s[fast], np.abs(speeds_deg_s[fast])
+    order = np.argsort(lags_s)
+    middle = np.searchsorted(np.cumsum(weights[order]), 0.5 * weights.sum())
+    return float(lags_s[order][min(int(middle), len(order) - 1)])

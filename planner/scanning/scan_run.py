@@ -65,6 +65,7 @@ class ScanOptions(NamedTuple):
     port: str = "emulator://"
     baud: int = 9600
     decimals: int = 1
+    lag_s: float = Settings().lag_s
     timeout_s: float = 0.5
     control: Path | None = None
     time_scale: float = 1.0
@@ -173,7 +174,7 @@ def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) ->
         timeout_s = options.timeout_s * options.time_scale
         table = open_things.enter_context(TableClient(port, timeout_s, options.decimals))
         line = _trigger_line(port, table, options, open_things)
-        settings = Settings(run_on_deg=options.run_on_deg)
+        settings = Settings(lag_s=options.lag_s, run_on_deg=options.run_on_deg)
         return run_latched(
             table,
             line,

@@ -18,11 +18,12 @@ from protocol import TableClient
 LIMITS = Limits(40.0, 100.0)
 
 
-def swinging_plan(seconds: float = 4.0) -> Plan:
+def swinging_plan(seconds: float = 4.0, acceleration_deg_s2: float = 10.0) -> Plan:
     """Return a plan that turns one way and back."""
     step_s = 0.5
     count = int(seconds / step_s)
-    accelerations = np.array([10.0 if k < count // 4 else -10.0 if k < 3 * count // 4 else 10.0 for k in range(count)])
+    signs = np.array([1.0 if k < count // 4 else -1.0 if k < 3 * count // 4 else 1.0 for k in range(count)])
+    accelerations = acceleration_deg_s2 * signs
     angles, speeds = roll_out(5.0, 0.0, accelerations, step_s)
     return Plan("", "", step_s, angles, speeds, accelerations, PathCost(0.0, 0.0, 0.0, 0.0))
 

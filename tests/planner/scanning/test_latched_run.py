@@ -84,6 +84,16 @@ def test_what_is_told_of_a_table_is_that_table_s(name: str, tmp_path: Path) -> N
     assert np.abs(run.angles_deg - run.latched_deg).max() <= 0.5e-4 + 1e-9
 
 
+def test_a_table_that_lags_more_than_the_emulator_loses_no_profile_for_it(tmp_path: Path) -> None:
+    slow_loop = tmp_path / "table.toml"
+    slow_loop.write_text("[gains.ramp]\nintegral_time_s = 0.025\n[gains.hold]\nintegral_time_s = 0.045\n")
+    run = latched_run(TriggerConditions(), swinging_plan(acceleration_deg_s2=39.0), query=f"&config={slow_loop}")
+    motion = ReadingMotion(swinging_plan(acceleration_deg_s2=39.0), LIMITS, 25.0)
+    off_deg = run.angles_deg - [motion.state_at(time_s).angle_deg for time_s in run.times_s]
+    assert np.abs(off_deg).max() > 0.8  # 25 ms behind
+    assert set(run.dropped.values()) <= {Drop.TABLE_UNREAD}
+
+
 def kept_among(sound: LatchedRun, count: int) -> frozenset[int]:
     """Return some profiles that are paired when nothing is wrong, taken while the table turns fast."""
     speeds = np.abs(np.gradient(sound.true_deg, sound.times_s))
