@@ -39,7 +39,8 @@ class RunVerification(NamedTuple):
         located_deg: (n + 1,) the encoder at each location, NaN where it is unknown.
         missing_triggers: locations without a latch of their own.
         forbidden_steps: steps in which the executed path touched a forbidden cell.
-        margin_deg: from the executed path to the nearest forbidden cell, over all locations; infinite without any.
+        margin_deg: from the executed path to the nearest forbidden cell, over all locations; infinite where
+            nothing is forbidden, NaN where no location is known.
         planned_cost: Eq. (7) of the plan.
         executed_cost: Eq. (7) of the encoder's path, its speeds and accelerations by differences; None where a
             location is unknown.
@@ -221,7 +222,7 @@ def _margin_deg(configuration_map: ConfigurationMap, located_deg: FloatArray) ->
     """Return the least way to a forbidden cell, which begins one sample before the forbidden sample."""
     known = [(location, float(angle_deg)) for location, angle_deg in enumerate(located_deg) if np.isfinite(angle_deg)]
     ways_deg = (configuration_map.forbidden_distance_deg(*place) for place in known)
-    return min(ways_deg, default=np.inf) - configuration_map.angle_step_deg
+    return min(ways_deg, default=np.nan) - configuration_map.angle_step_deg
 
 
 def _executed_cost(run_input: RunInput, motion: TableMotion, located_deg: FloatArray) -> PathCost:

@@ -13,14 +13,13 @@ from scipy.spatial.transform import Rotation
 
 from planner.arrays import FloatArray
 from planner.scanning.calibration import GREATEST_POINT_ERROR_MM, CalibrationError
-from planner.scanning.probe_fit import CENTRE, RADIUS, SHIFT, TURN, ProbeFit, Views, cosines, fit_probe
+from planner.scanning.probe_fit import CENTRE, RADIUS, SHIFT, TURN, ProbeFit, Views, fit_heights, fit_rays
 from planner.scanning.score_tests import FALSE_ALARMS, Change, NormalEquations, find_change
 
 # The least that determines a place and says how well.
 _FEWEST_POSES = 6
 # Points a view that a search for the right minimum needs; the last fit takes all.
 _SEARCH_POINTS = 24
-_SEARCH_EVALUATIONS = 60
 # Two ends of the search are the same minimum when they are this near; one that fits almost as well is a rival.
 _SAME_DEG, _SAME_MM = 2.0, 2.0
 _RIVAL_RATIO = 1.5
@@ -81,9 +80,9 @@ def calibrate_probe(
     circles, and a circle does not say on which side of it the centre is; so a single guess can end in a false minimum.
     The search starts from the nominal place turned into each of the 24 directions of a cube; the best end counts.
 
-    The fit weights each point by its noise, which is that along the ray times the cosine of the incidence. Then the
-    residuals are tested: all of them against the noise (chi-square), the radius that fits best against the one given,
-    and their order for a sphere or a probe that moved, drifted, or was elsewhere in one view. Clean data are refused
+    The last fit is the maximum-likelihood one for noise along the rays. Its residuals are tested: all of them against
+    the noise (chi-square), the radius that fits best against the one given, and their order for a sphere or a probe
+    that moved, drifted, or was elsewhere in one view. Clean data are refused
     once in 1000 times. The arm is taken as exact.
 
     Args:
@@ -99,26 +98,25 @@ def calibrate_probe(
     """
     _check_views(T_BF, points_S, radius_mm)
     thinned = Views.of(T_BF, [view[:: max(1, len(view) // _SEARCH_POINTS)] for view in points_S])
-    found = [
-        fit_probe(thinned, radius_mm, guess, evaluations=_SEARCH_EVALUATIONS) for guess in cube_turns(nominal_T_FS)
-    ]
+    found = [fit_heights(thinned, radius_mm, guess) for guess in cube_turns(nominal_T_FS)]
     best = min(found, key=lambda end: end.rms_mm)
     mirrored = _beyond_the_plane(thinned, best)
-    found.append(fit_probe(thinned, radius_mm, mirrored, best.centre, evaluations=_SEARCH_EVALUATIONS))
+    found.append(fit_heights(thinned, radius_mm, mirrored, best.centre))
     views = Views.of(T_BF, points_S)
-    weights = 1.0 / (noise_mm * cosines(views, best.T_FS, best.centre))
-    fit = fit_probe(views, radius_mm, best.T_FS, best.centre, weights)
-    free = fit_probe(views, radius_mm, fit.T_FS, fit.centre, weights, radius_is_known=False)
-    radius_uncertainty_mm = float(np.sqrt(_covariance(free, weights)[RADIUS, RADIUS].item()))
-    radius_score = ((free.radius_mm - radius_mm) / np.hypot(radius_uncertainty_mm, radius_tolerance_mm)) ** 2
-    ratio = _check_residuals(views, fit, weights, free.radius_mm, radius_score)
+    fit = fit_rays(views, best, noise_mm)
+    free = fit_rays(views, fit, noise_mm, radius_is_known=False)
+    radius_uncertainty_mm = float(np.sqrt(_covariance(free)[RADIUS, RADIUS].item()))
+    # The likelihood ratio, lowered by what the certificate leaves open.
+    known_share = 1.0 / (1.0 + (radius_tolerance_mm / radius_uncertainty_mm) ** 2)
+    radius_score = known_share * (fit.chi_square - free.chi_square)
+    ratio = _check_residuals(views, fit, free.radius_mm, radius_score)
     rival = _rival(found, best)
     if rival is not None:
         raise CalibrationError(
             f"the views fit two places of the probe equally well, {rival};"
             " look at the sphere from more directions, off the middle of the line and on both sides of it as well"
         )
-    covariance = max(1.0, ratio**2) * _covariance(fit, weights)
+    covariance = max(1.0, ratio**2) * _covariance(fit)
     uncertainty_mm, uncertainty_rad = (float(np.sqrt(np.trace(covariance[each, each]))) for each in (SHIFT, TURN))
     point_error_mm = _point_error_mm(fit, covariance)
     if not point_error_mm <= GREATEST_POINT_ERROR_MM:
@@ -149,15 +147,12 @@ def calibrate_probe(
     )
 
 
-def _check_residuals(
-    views: Views, fit: ProbeFit, weights: FloatArray, free_radius_mm: float, radius_score: float
-) -> float:
+def _check_residuals(views: Views, fit: ProbeFit, free_radius_mm: float, radius_score: float) -> float:
     """Refuse residuals that are not the probe's noise; return them in units of that noise.
 
     Of a sphere of another size and one that moved, the one that explains more of the residuals is named.
     """
-    residuals, jacobian = weights * fit.heights_mm, weights[:, np.newaxis] * fit.jacobian
-    equations = NormalEquations.of(residuals, jacobian, views.view)
+    equations = NormalEquations.of(fit.residuals, fit.jacobian, views.view)
     ratio = float(np.sqrt(equations.chi_square / max(1, equations.freedom)))
     off = f"the points lie {fit.rms_mm:.3f} mm (rms) off one sphere of radius {fit.radius_mm:g} mm"
     change = find_change(equations, CENTRE, _ALARMS_EACH, noise_is_known=True)
@@ -247,10 +242,9 @@ def _check_views(T_BF: FloatArray, points_S: Sequence[FloatArray], radius_mm: fl
         )
 
 
-def _covariance(fit: ProbeFit, weights: FloatArray) -> FloatArray:
+def _covariance(fit: ProbeFit) -> FloatArray:
     """Return the covariance of the unknowns; infinite where the views do not determine them."""
-    weighted = weights[:, np.newaxis] * fit.jacobian
-    information = weighted.T @ weighted
+    information = fit.jacobian.T @ fit.jacobian
     scale = 1.0 / np.sqrt(np.diag(information))
     scaled = information * scale * scale[:, np.newaxis]
     if not np.isfinite(scaled).all() or np.linalg.cond(scaled) > 1e13:

@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from planner.arrays import FloatArray, IndexArray
 
-# At grazing incidence the noise along the ray hardly shows as height; the curvature of the sphere does.
+# Beyond this incidence a sphere is not measured; a ray that meets it flatter, or misses it, has the wrong sphere.
 _LEAST_COSINE = 0.2
+_SEARCH_EVALUATIONS = 60
 
 TURN, SHIFT, CENTRE, RADIUS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 10)
 """The unknowns: turn (rad) and shift (mm) of the probe on the flange, the sphere's centre and radius (mm)."""
@@ -48,13 +49,15 @@ class ProbeFit:
         centre: The sphere's centre in the base, `(3,)`.
         radius_mm: The sphere's radius, as given or as found.
         heights_mm: `(m,)` height of each point above the sphere.
-        jacobian: `(m, 9)` or `(m, 10)` derivatives of the heights.
+        residuals: `(m,)` what was minimised: the heights, or the errors along the rays in units of the noise.
+        jacobian: `(m, 9)` or `(m, 10)` derivatives of the residuals.
     """
 
     T_FS: FloatArray
     centre: FloatArray
     radius_mm: float
     heights_mm: FloatArray
+    residuals: FloatArray
     jacobian: FloatArray
 
     @property
@@ -62,81 +65,115 @@ class ProbeFit:
         """Root mean square of the heights."""
         return float(np.sqrt(np.mean(self.heights_mm**2)))
 
+    @property
+    def chi_square(self) -> float:
+        """Sum of the squared residuals."""
+        return float(np.sum(self.residuals**2))
 
-def fit_probe(
-    views: Views,
-    radius_mm: float,
-    guess: FloatArray,
-    centre: FloatArray | None = None,
-    weights: FloatArray | None = None,
-    radius_is_known: bool = True,
-    evaluations: int | None = None,
-) -> ProbeFit:
-    """Return where the unknowns come to from a guess of T_FS.
+
+class _Sphere:
+    """The points of all views against a sphere, as functions of the unknowns."""
+
+    def __init__(self, views: Views, guess: FloatArray, radius_mm: float | None) -> None:
+        """Take the sphere's radius, or None where it is the tenth unknown."""
+        self.lengths = np.linalg.norm(views.points, axis=1)
+        self._views, self._guess, self._radius_mm = views, guess[:3, :3], radius_mm
+        self._rays = views.points / self.lengths[:, np.newaxis]
+
+    def radius_mm(self, unknown: FloatArray) -> float:
+        return float(unknown[9]) if self._radius_mm is None else self._radius_mm
+
+    def direction(self, unknown: FloatArray) -> FloatArray:
+        """Return the direction of S on the flange, `(3, 3)`."""
+        return np.asarray(Rotation.from_rotvec(unknown[TURN]).as_matrix() @ self._guess)
+
+    def in_base(self, unknown: FloatArray) -> FloatArray:
+        on_flange = self._views.points @ self.direction(unknown).T + unknown[SHIFT]
+        return np.asarray(np.einsum("nij,nj->ni", self._views.R, on_flange) + self._views.t)
+
+    def heights(self, unknown: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.norm(self.in_base(unknown) - unknown[CENTRE], axis=1) - self.radius_mm(unknown))
+
+    def distances(self, unknown: FloatArray) -> FloatArray:
+        """Return where along each ray it meets the sphere; of a ray that passes by, about where it is nearest."""
+        centre_F = np.einsum("nji,nj->ni", self._views.R, unknown[CENTRE] - self._views.t)
+        centre_S = (centre_F - unknown[SHIFT]) @ self.direction(unknown)
+        along = np.einsum("ni,ni->n", centre_S, self._rays)
+        inside2 = self.radius_mm(unknown) ** 2 - np.einsum("ni,ni->n", centre_S, centre_S) + along**2
+        return np.asarray(along - np.sqrt(np.maximum(inside2, (_LEAST_COSINE * self.radius_mm(unknown)) ** 2)))
+
+    def height_slopes(self, unknown: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives of the heights of points in S by the unknowns, and along the rays, `(m,)`."""
+        direction = self.direction(unknown)
+        turned = points @ direction.T
+        in_base = np.einsum("nij,nj->ni", self._views.R, turned + unknown[SHIFT]) + self._views.t
+        radial = in_base - unknown[CENTRE]
+        radial /= np.linalg.norm(radial, axis=1, keepdims=True)
+        on_flange = np.einsum("nji,nj->ni", self._views.R, radial)
+        turning = np.cross(turned, on_flange) @ _left_jacobian(unknown[TURN])
+        columns = [turning, on_flange, -radial]
+        if self._radius_mm is None:
+            columns.append(-np.ones((len(radial), 1)))
+        along = np.einsum("ni,ni->n", on_flange @ direction, self._rays)
+        return np.column_stack(columns), along
+
+    def height_jacobian(self, unknown: FloatArray) -> FloatArray:
+        return self.height_slopes(unknown, self._views.points)[0]
+
+    def ray_jacobian(self, unknown: FloatArray) -> FloatArray:
+        """Return the derivatives of measured less modelled distances, by the implicit function |t u - c| = r."""
+        met = self.distances(unknown)[:, np.newaxis] * self._rays
+        slopes, along = self.height_slopes(unknown, met)
+        return np.asarray(slopes / np.minimum(along, -_LEAST_COSINE)[:, np.newaxis])
+
+
+def fit_heights(views: Views, radius_mm: float, guess: FloatArray, centre: FloatArray | None = None) -> ProbeFit:
+    """Return where a quick fit of the points' heights above the sphere comes to, from a guess of T_FS.
+
+    It converges from far away, but noise along a slanting ray moves it a little: the square of the noise over the
+    radius. `fit_rays` takes it from there.
 
     Args:
         views: The points.
-        radius_mm: The sphere's radius; the start of the search where it is not known.
+        radius_mm: The sphere's radius.
         guess: T_FS to start from.
         centre: The sphere's centre to start from; the middle of the points where left out.
-        weights: `(m,)` 1 over each height's standard deviation; all alike where left out.
-        radius_is_known: Whether the radius stays as given.
-        evaluations: Largest number of evaluations.
     """
-    weight = np.ones(len(views.points)) if weights is None else weights
+    sphere = _Sphere(views, guess, radius_mm)
+    if centre is None:
+        centre = sphere.in_base(np.concatenate((np.zeros(3), guess[:3, 3]))).mean(axis=0)
+    start = np.concatenate((np.zeros(3), guess[:3, 3], centre))
+    end = least_squares(sphere.heights, start, sphere.height_jacobian, method="lm", max_nfev=_SEARCH_EVALUATIONS).x
+    return _ended(sphere, end, sphere.heights(end), sphere.height_jacobian(end))
 
-    def placed(unknown: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the points turned as they are on the flange, before the probe's shift; and in the base."""
-        turned = views.points @ (Rotation.from_rotvec(unknown[TURN]).as_matrix() @ guess[:3, :3]).T
-        in_base = np.einsum("nij,nj->ni", views.R, turned + unknown[SHIFT]) + views.t
-        return turned, in_base
 
-    def heights(unknown: FloatArray) -> FloatArray:
-        r = radius_mm if radius_is_known else unknown[9]
-        return np.asarray(np.linalg.norm(placed(unknown)[1] - unknown[CENTRE], axis=1) - r)
+def fit_rays(views: Views, start: ProbeFit, noise_mm: float, radius_is_known: bool = True) -> ProbeFit:
+    """Return the maximum-likelihood fit for noise along the rays, which start at the origin of S.
 
-    def weighted_heights(unknown: FloatArray) -> FloatArray:
-        return weight * heights(unknown)
+    Args:
+        views: The points.
+        start: A fit to start from.
+        noise_mm: Standard deviation of a point along its ray.
+        radius_is_known: Whether the radius stays as it is in `start`.
+    """
+    sphere = _Sphere(views, start.T_FS, start.radius_mm if radius_is_known else None)
+
+    def residuals(unknown: FloatArray) -> FloatArray:
+        return np.asarray((sphere.lengths - sphere.distances(unknown)) / noise_mm)
 
     def jacobian(unknown: FloatArray) -> FloatArray:
-        turned, in_base = placed(unknown)
-        radial = in_base - unknown[CENTRE]
-        radial /= np.linalg.norm(radial, axis=1, keepdims=True)
-        on_flange = np.einsum("nji,nj->ni", views.R, radial)
-        turning = np.cross(turned, on_flange) @ _left_jacobian(unknown[TURN])
-        columns = [turning, on_flange, -radial]
-        return np.column_stack(columns if radius_is_known else [*columns, -np.ones(len(radial))])
+        return np.asarray(sphere.ray_jacobian(unknown) / noise_mm)
 
-    def weighted_jacobian(unknown: FloatArray) -> FloatArray:
-        return weight[:, np.newaxis] * jacobian(unknown)
+    unknown = [np.zeros(3), start.T_FS[:3, 3], start.centre, np.full(0 if radius_is_known else 1, start.radius_mm)]
+    end = least_squares(residuals, np.concatenate(unknown), jacobian, method="lm").x
+    return _ended(sphere, end, residuals(end), jacobian(end))
 
-    if centre is None:
-        centre = placed(np.concatenate((np.zeros(3), guess[:3, 3])))[1].mean(axis=0)
-    start = [np.zeros(3), guess[:3, 3], centre, np.full(0 if radius_is_known else 1, radius_mm)]
-    end = least_squares(weighted_heights, np.concatenate(start), weighted_jacobian, method="lm", max_nfev=evaluations).x
+
+def _ended(sphere: _Sphere, end: FloatArray, residuals: FloatArray, jacobian: FloatArray) -> ProbeFit:
     T_FS = np.eye(4)
-    T_FS[:3, :3] = Rotation.from_rotvec(end[TURN]).as_matrix() @ guess[:3, :3]
+    T_FS[:3, :3] = sphere.direction(end)
     T_FS[:3, 3] = end[SHIFT]
-    return ProbeFit(
-        T_FS,
-        end[CENTRE],
-        radius_mm if radius_is_known else float(end[9]),
-        heights(end),
-        jacobian(end),
-    )
-
-
-def cosines(views: Views, T_FS: FloatArray, centre: FloatArray) -> FloatArray:
-    """Return the cosine `(m,)` between each point's ray and the sphere's radius there.
-
-    Noise along the ray shows as height by this factor.
-    """
-    rays = views.points @ T_FS[:3, :3].T
-    radial = np.einsum("nij,nj->ni", views.R, rays + T_FS[:3, 3]) + views.t - centre
-    rays = np.einsum("nij,nj->ni", views.R, rays)
-    lengths = np.linalg.norm(rays, axis=1) * np.linalg.norm(radial, axis=1)
-    cosines = np.abs(np.einsum("ni,ni->n", rays, radial)) / np.maximum(lengths, 1e-12)
-    return np.asarray(np.maximum(cosines, _LEAST_COSINE))
+    return ProbeFit(T_FS, end[CENTRE], sphere.radius_mm(end), sphere.heights(end), residuals, jacobian)
 
 
 def _left_jacobian(turn: FloatArray) -> FloatArray:

@@ -186,6 +186,21 @@ def test_a_command_that_came_late_is_made_up_for() -> None:
     assert max(abs(each.encoder_deg - motion.state_at(each.time_s).angle_deg) for each in after) < 0.05
 
 
+@pytest.mark.parametrize("lead_s", [0.0, 0.04, 0.1])
+def test_a_lead_makes_the_reference_early_by_that_time(lead_s: float) -> None:
+    port = FaultyPort()
+    record = run(motion_at(20.0, 3.0), port, Settings(lead_s=lead_s, tolerance_deg=10.0))
+    assert record.failure is None
+    steady = [each for each in record.observations if each.source == "inside" and 1.0 < each.time_s < 2.5]
+    planned_deg = [motion_at(20.0, 3.0).state_at(each.time_s).angle_deg for each in steady]
+    # At a constant 20 deg/s an angle ahead is a time ahead.
+    reference_deg = np.array([each.reference_deg for each in steady], dtype=np.float64)
+    ahead_s = np.mean(reference_deg - planned_deg) / 20.0
+    behind_s = np.mean(reference_deg - [each.encoder_deg for each in steady]) / 20.0
+    assert ahead_s == pytest.approx(lead_s, abs=0.001)
+    assert behind_s == pytest.approx(Settings().lag_s, abs=0.002)
+
+
 def test_a_table_that_answers_late_is_stopped() -> None:
     def dawdle(data: bytes) -> bytes:
         port.table.advance(200)

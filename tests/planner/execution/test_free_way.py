@@ -36,6 +36,31 @@ def test_the_start_is_reached_the_other_way_round_where_the_short_one_is_not_fre
     assert turns_to_start(walled, 130.0, 90.0) == 1
 
 
+def free_by_small_steps(configuration_map: ConfigurationMap, from_deg: float, to_deg: float) -> bool:
+    """Tell whether each of many angles on the way is allowed at the first location."""
+    count = 2 + round(abs(to_deg - from_deg) / 0.2)
+    return all(configuration_map.is_allowed(0, float(angle)) for angle in np.linspace(from_deg, to_deg, count))
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_way_to_the_start_is_the_shorter_of_the_free_ones(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    values = np.ones((2, 72))
+    for first in rng.integers(0, 72, int(rng.integers(0, 3))):
+        values[0, (int(first) + np.arange(int(rng.integers(1, 6)))) % 72] = 0.0
+    configuration_map = ConfigurationMap(values)
+    position_deg, start_deg = round(float(rng.uniform(-800.0, 800.0)), 1), round(float(rng.uniform(-200.0, 560.0)), 1)
+    ends_deg = [start_deg + 360.0 * turns for turns in range(-6, 7)]
+    ways = {abs(end - position_deg): end for end in ends_deg if abs(end - position_deg) < 360.0}
+    free = [way for way, end in ways.items() if free_by_small_steps(configuration_map, position_deg, end)]
+    if not free:
+        with pytest.raises(WayError):
+            turns_to_start(configuration_map, position_deg, start_deg)
+        return
+    chosen = start_deg + 360.0 * turns_to_start(configuration_map, position_deg, start_deg)
+    assert chosen == pytest.approx(ways[min(free)])
+
+
 def test_without_a_free_way_nothing_is_moved() -> None:
     walled_twice = blocks_map(8, 360, [(0, 7, 100, 120), (0, 7, 200, 220)], edge=0)
     with pytest.raises(WayError, match="draw the arm back, and say so with --arm-away"):

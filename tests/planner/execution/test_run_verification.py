@@ -1,5 +1,7 @@
 """The verdict, on records made by hand: what was seen is known exactly."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from planner.execution.run_input import RunInput
 from planner.execution.run_record import Observation, Record
 from planner.execution.run_verification import RunVerification, verify_run
 from planner.execution.table_motion import TableMotion
+from planner.map.config_map import ConfigurationMap
 from tests.planner.run_examples import short_run_input
 
 
@@ -67,3 +70,64 @@ def test_a_latch_of_an_earlier_trigger_does_not_count(run_input: RunInput) -> No
     away = np.flatnonzero(np.abs(run_input.plan.angles_deg) > 1.0)
     assert set(away) <= set(result.missing_triggers)
     assert not result.is_verified
+
+
+def margin_by_small_steps(configuration_map: ConfigurationMap, angles_deg: list[float]) -> float:
+    """Return how far the nearest forbidden angle is, found by going outwards from each angle in steps of 0.05 deg."""
+    offsets_deg = np.arange(0.0, 180.0, 0.05)
+    nearest = np.inf
+    for location, angle_deg in enumerate(angles_deg):
+        for sign in (-1.0, 1.0):
+            for offset_deg in offsets_deg[offsets_deg < nearest]:
+                if not configuration_map.is_allowed(location, angle_deg + sign * offset_deg):
+                    nearest = float(offset_deg)
+                    break
+    return nearest
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_margin_is_that_of_a_search_in_small_steps(seed: int, run_input: RunInput) -> None:
+    rng = np.random.default_rng(seed)
+    plan, count = run_input.plan, len(run_input.plan.angles_deg)
+    angle_count = int(rng.choice([24, 36, 90, 120]))
+    values = rng.uniform(0.5, 1.0, (count, angle_count))
+    # Forbidden cells anywhere but beside the plan: round the turn and on both sides.
+    for location, angle_deg in enumerate(plan.angles_deg):
+        sample = int(rng.integers(angle_count))
+        way_deg = abs((sample * 360.0 / angle_count - angle_deg + 180.0) % 360.0 - 180.0)
+        if way_deg > 1.5 * 360.0 / angle_count:
+            values[location, sample] = 0.0
+    changed = replace(run_input, problem=replace(run_input.problem, map=ConfigurationMap(values)))
+    turned = changed.turned(int(rng.integers(-2, 3)))
+    result = checked(turned, 0.0)
+    expected = margin_by_small_steps(turned.problem.map, turned.plan.angles_deg.tolist())
+    assert result.margin_deg == pytest.approx(expected, abs=0.0501)
+
+
+def test_the_margin_of_a_run_that_was_not_seen_is_unknown(run_input: RunInput) -> None:
+    motion = TableMotion(run_input.plan, run_input.problem.limits)
+    result = verify_run(run_input, motion, Record(), lead_s=0.0)
+    assert np.isnan(result.margin_deg)
+    assert not result.is_verified
+
+
+@pytest.mark.parametrize("lead_s", [0.0, 0.01, 0.05])
+def test_commands_sent_ahead_make_the_reference_early_and_the_encoder_less_late(
+    run_input: RunInput, lead_s: float
+) -> None:
+    """A table made by hand: its reference is `lead_s` ahead of the plan's time, its encoder 20 ms behind that."""
+    lag_s, motion = 0.02, TableMotion(run_input.plan, run_input.problem.limits)
+    times_s = np.arange(0.1, motion.column_times_s[-1] - 0.1, 0.01)
+    seen = [
+        Observation(
+            float(time_s), "inside",
+            encoder_deg=motion.state_at(float(time_s) + lead_s - lag_s).angle_deg,
+            reference_deg=motion.state_at(float(time_s) + lead_s).angle_deg,
+        )
+        for time_s in times_s
+    ]  # fmt: skip
+    deviations = verify_run(run_input, motion, Record(observations=seen), lead_s).deviations
+    speeds = [motion.state_at(float(time_s)).speed_deg_s for time_s in times_s]
+    assert deviations["reference"].anywhere_deg == pytest.approx(0.0, abs=1e-9)
+    expected = abs(lead_s - lag_s) * float(np.abs(speeds).max())
+    assert deviations["encoder"].anywhere_deg == pytest.approx(expected, rel=0.2, abs=0.01)

@@ -1,14 +1,22 @@
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from planner.map import map_plots
 from planner.map.config_map import ConfigurationMap
 from planner.map.map_colours import DARKEST_GRAY, coloured
 from planner.map.map_plots import plot_map, plot_map_cylinder
 from planner.map.map_reasons import FIRST_PAIR, reason_texts
+from planner.planning.plan import make_plan
+from planner.planning.plan_plots import plan_figure
+from planner.planning.problem import Problem
 from planner.reasons import Reason
+from tests.planner.drawn import Drawn
+from tools import figures
 
 PAIRS = tuple(f"part {i} and table" for i in range(8))
 
@@ -55,3 +63,57 @@ def test_the_same_map_is_the_same_picture_to_the_byte(plot: type, tmp_path: Path
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.png", "b.png"]
     assert imread(tmp_path / "a.png").shape[1] == 960
+
+
+def scattered_map() -> ConfigurationMap:
+    """Return a map without symmetry: other numbers of locations and angles, some dark cells here and there."""
+    rng = np.random.default_rng(4)
+    return ConfigurationMap(np.where(rng.random((12, 20)) < 0.3, 0.0, rng.uniform(0.6, 1.0, (12, 20))))
+
+
+def flat_map(monkeypatch: pytest.MonkeyPatch) -> Figure:
+    kept: list[Figure] = []
+    monkeypatch.setattr(map_plots, "_save", lambda figure, _file: kept.append(figure))
+    plot_map(scattered_map(), Path("unused"))
+    return kept[0]
+
+
+def map_of_a_plan(_: pytest.MonkeyPatch) -> Figure:
+    problem = Problem(scattered_map())
+    return plan_figure(problem, make_plan(problem, "test", np.zeros(12), np.zeros(12), np.zeros(11)), "")
+
+
+def map_of_the_paper(_: pytest.MonkeyPatch) -> Figure:
+    figure = Figure(figsize=(6.0, 4.0))
+    figures._draw_map(figure.subplots(), scattered_map())  # noqa: SLF001 - the part of Fig. 6 to 9 that draws the map
+    return figure
+
+
+@pytest.mark.parametrize("draw", [flat_map, map_of_a_plan, map_of_the_paper])
+def test_a_cell_is_drawn_at_its_location_and_angle(
+    draw: Callable[[pytest.MonkeyPatch], Figure], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figure, shown = draw(monkeypatch), scattered_map()
+    drawn, axes = Drawn(figure), figure.axes[0]
+    assert axes.get_xlabel() in ("scan location", "")
+    assert axes.get_ylabel().startswith("table angle")
+    for location in range(12):
+        for sample in range(1, 20):  # the path of the plan lies at 0
+            bright = drawn.colour(axes, location, sample * 18.0).mean()
+            assert (bright > 0.5) == bool(shown.allowed[location, sample])
+
+
+def test_the_tube_shows_each_angle_in_its_row_and_each_location_in_its_column() -> None:
+    image = coloured(scattered_map())[0]
+    for centre_deg in (0.0, 180.0):
+        tube = map_plots._tube(image, centre_deg, 700, 260)  # noqa: SLF001 - the picture without its axes
+        for offset_deg in (-72.0, -36.0, 0.0, 36.0, 72.0):
+            y, z = np.sin(np.radians(offset_deg)), np.cos(np.radians(offset_deg))
+            row = int((y + 1.0) / 2.0 * 260)
+            sample = round((centre_deg + offset_deg) / 18.0) % 20
+            for location in range(12):
+                # The tube is 4 radii long; its near side is drawn bulged to the left by 0.3 of the depth.
+                x = 4.0 * (location + 0.5) / 12.0 - 0.3 * z
+                column = int((x + 0.3) / 4.6 * 700)
+                shade = 0.55 + 0.45 * z
+                assert tube[row, column, :3] == pytest.approx(image[sample, location] * shade, abs=0.02)
