@@ -25,6 +25,8 @@ from planner.scanning.probe import Profiles
 
 # At most so many points are looked at, and at least half as many of a larger cloud: their sigma is good to 0.5 %.
 SAMPLES = 40_000
+# trimesh holds all triangles near all points at once, some 25 kB a point on a fine mesh.
+_NEAREST_BLOCK = 1000
 
 
 class Part(StrEnum):
@@ -222,9 +224,14 @@ def account(chain: Chain, samples: Profiles, mesh: trimesh.Trimesh, wire_step_de
 
 def signed_distances_mm(mesh: trimesh.Trimesh, points: FloatArray) -> FloatArray:
     """Return the distance `(n,)` of each point `(n, 3)` from the nearest place of a surface, outside positive."""
-    nearest, distances_mm, triangles = mesh.nearest.on_surface(points)
-    outward = np.einsum("ij,ij->i", points - nearest, np.asarray(mesh.face_normals)[triangles])
-    return np.asarray(np.copysign(distances_mm, outward))
+    signed = np.empty(len(points))
+    normals = np.asarray(mesh.face_normals)
+    for first in range(0, len(points), _NEAREST_BLOCK):
+        block = slice(first, first + _NEAREST_BLOCK)
+        nearest, distances_mm, triangles = mesh.nearest.on_surface(points[block])
+        outward = np.einsum("ij,ij->i", points[block] - nearest, normals[triangles])
+        signed[block] = np.copysign(distances_mm, outward)
+    return signed
 
 
 def _rms(values: FloatArray, dimensions: int = 1) -> float:

@@ -19,6 +19,8 @@ from planner.scanning.probe import Sight
 # From where the part is looked at: azimuth and elevation in deg.
 _VIEWS = ((-60.0, 35.0), (120.0, 35.0))
 _WIDTH, _HEIGHT = 700, 560
+# So many rows of a picture are cast at once, which bounds the memory.
+_ROWS_AT_ONCE = 40
 # A point this far below the surface is still on it.
 _ON_SURFACE_MM = 1.0
 _BARE = np.array((0.80, 0.81, 0.83))
@@ -81,17 +83,20 @@ class _View(NamedTuple):
 
     def surface(self, caster: RayCaster) -> tuple[Image, FloatArray]:
         """Return the bare part, shaded, `(h, w, 3)`, and its depth `(h, w)`, NaN beside it."""
-        x = (np.arange(_WIDTH) + 0.5 - 0.5 * _WIDTH) * self.pixel_mm
-        y = (0.5 * _HEIGHT - np.arange(_HEIGHT) - 0.5) * self.pixel_mm
-        start = self.middle - 0.5 * self.span_mm * self.ahead
-        origins = start + x[np.newaxis, :, np.newaxis] * self.right + y[:, np.newaxis, np.newaxis] * self.up
-        hits = caster.first_hits(origins.reshape(-1, 3), np.tile(self.ahead, (_WIDTH * _HEIGHT, 1)))
-        image = np.ones((_WIDTH * _HEIGHT, 3))
-        struck = hits.triangles >= 0
+        image, depths_mm = np.ones((_HEIGHT, _WIDTH, 3)), np.empty((_HEIGHT, _WIDTH))
         light = self.up + 0.4 * self.right - 1.2 * self.ahead
-        bright = 0.62 + 0.38 * np.clip(caster.normals[hits.triangles[struck]] @ (light / np.linalg.norm(light)), 0, 1)
-        image[struck] = bright[:, np.newaxis] * _BARE
-        return image.reshape(_HEIGHT, _WIDTH, 3), hits.distances_mm.reshape(_HEIGHT, _WIDTH)
+        x = (np.arange(_WIDTH) + 0.5 - 0.5 * _WIDTH) * self.pixel_mm
+        start = self.middle - 0.5 * self.span_mm * self.ahead + x[:, np.newaxis] * self.right
+        for first in range(0, _HEIGHT, _ROWS_AT_ONCE):
+            rows = np.arange(first, min(first + _ROWS_AT_ONCE, _HEIGHT))
+            y = (0.5 * _HEIGHT - rows - 0.5) * self.pixel_mm
+            origins = (start + y[:, np.newaxis, np.newaxis] * self.up).reshape(-1, 3)
+            hits = caster.first_hits(origins, np.tile(self.ahead, (len(origins), 1)))
+            facing = caster.normals[hits.triangles] @ (light / np.linalg.norm(light))
+            shade = np.where(hits.triangles >= 0, 0.62 + 0.38 * np.clip(facing, 0, 1), np.nan).reshape(-1, _WIDTH, 1)
+            image[rows] = np.where(np.isnan(shade), 1.0, shade * _BARE)
+            depths_mm[rows] = hits.distances_mm.reshape(-1, _WIDTH)
+        return image, depths_mm
 
 
 def _painted(view: _View, caster: RayCaster, points: FloatArray, colours: FloatArray, size: int) -> Image:
