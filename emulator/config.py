@@ -3,7 +3,6 @@
 The numbers themselves, and where each comes from, are in `default.toml`.
 """
 
-import tomllib
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self
@@ -12,10 +11,9 @@ from emulator.faults import Fault, FaultError, fault_from
 from emulator.fixed_point import SPEED_BITS, gain_registers
 from emulator.parameter import brief
 from emulator.toml_section import ConfigError, merged, quantity, section
+from protocol.data_file import DataFileError, read_toml
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
-LONGEST_FILE = 1 << 20
-"""Bytes; a table's constants take a few thousand."""
 
 
 @dataclass(frozen=True)
@@ -198,17 +196,9 @@ def load_config(path: str | Path | None = None) -> TableConfig:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        with path.open("rb") as file:
-            text = file.read(LONGEST_FILE + 1).decode()
-        if len(text) <= LONGEST_FILE:
-            return tomllib.loads(text)
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from error
-    except RecursionError:
-        raise ConfigError(f"{path}: is not TOML of a table: it is nested too deep") from None
-    except ValueError as error:  # tomllib passes on that an integer has too many digits
-        raise ConfigError(f"{path}: is not TOML: {error}") from error
-    raise ConfigError(f"{path}: cannot be read: it has more than {LONGEST_FILE} bytes; is it a table's configuration?")
+        return read_toml(path)
+    except DataFileError as error:
+        raise ConfigError(str(error)) from error
 
 
 def _faults(entries: object, where: str) -> tuple[Fault, ...]:

@@ -8,6 +8,7 @@ from dataclasses import field, fields, is_dataclass
 from typing import Any, get_type_hints
 
 from emulator.parameter import brief
+from protocol.data_file import did_you_mean
 
 
 class ConfigError(ValueError):
@@ -34,7 +35,10 @@ def merged(defaults: dict[str, Any], changes: dict[str, Any], source: str, where
     result = dict(defaults)
     for key, value in changes.items():
         if key not in defaults:
-            raise ConfigError(f"{source}: {where}{key[:60]} is not a key; allowed here are {', '.join(defaults)}")
+            raise ConfigError(
+                f"{source}: {where}{key[:60]} is not a key; allowed here are {', '.join(defaults)}"
+                f"{did_you_mean(key[:60], defaults)}"
+            )
         nested = isinstance(defaults[key], dict)
         if nested and not isinstance(value, dict):
             raise ConfigError(f"{source}: {where + key} must be a section, not {brief(value)}")

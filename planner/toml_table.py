@@ -5,12 +5,12 @@ never be a silent default.
 """
 
 import math
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
 from planner.errors import ScanFileError
+from protocol.data_file import DataFileError, did_you_mean, read_toml, shown
 
 
 class TomlTable:
@@ -30,20 +30,32 @@ class TomlTable:
             ScanFileError: The file cannot be read or is not TOML.
         """
         try:
-            return cls(file, tomllib.loads(file.read_text(encoding="utf-8")))
-        except OSError as error:
-            raise ScanFileError(f"{file}: cannot be read ({error.strerror or error})") from error
-        except (ValueError, RecursionError) as error:  # tomllib passes on that an integer is too long
-            raise ScanFileError(f"{file}: not a TOML file: {error}") from error
+            return cls(file, read_toml(file))
+        except DataFileError as error:
+            raise ScanFileError(str(error)) from error
 
     def __contains__(self, key: str) -> bool:
         return key in self._values
 
     def refuse(self, key: str, allowed: str) -> ScanFileError:
         """Return the error that says that the value of `key` is not what is allowed."""
+        name = f"{self.file}: {self._prefix}{key}"
         if key not in self._values:
-            return ScanFileError(f"{self.file}: {self._prefix}{key} is missing; it must be {allowed}")
-        return ScanFileError(f"{self.file}: {self._prefix}{key} is {self._values[key]!r}; it must be {allowed}")
+            misspelt = self._misspelt(key)
+            first = "" if misspelt is None else f"{self._prefix}{misspelt} is not a known key; did you mean {key}? "
+            return ScanFileError(f"{self.file}: {first}{self._prefix}{key} is missing; it must be {allowed}")
+        return ScanFileError(f"{name} is {shown(self._values[key])}; it must be {allowed}")
+
+    def _misspelt(self, key: str) -> str | None:
+        """Return a key that nothing has read and that looks like an absent one."""
+        unread = [other for other in self._values if other not in self._read]
+        return next((other for other in unread if did_you_mean(other, [key])), None)
+
+    def _unknown(self, key: str, *known: str) -> ScanFileError:
+        return ScanFileError(
+            f"{self.file}: {self._prefix}{key} is not a known key; known are {', '.join(sorted(known))}"
+            f"{did_you_mean(key, known)}"
+        )
 
     def _take(self, key: str, default: object = None) -> Any:  # noqa: ANN401 - any type until it is checked
         self._read.add(key)
@@ -94,7 +106,9 @@ class TomlTable:
         return str(value)
 
     def table(self, key: str) -> "TomlTable":
-        """Return the table `key`; an absent one is empty."""
+        """Return the table `key`; an absent one is empty, unless it is there under a name that is nearly the same."""
+        if key not in self._values and (misspelt := self._misspelt(key)) is not None:
+            raise self._unknown(misspelt, key)
         value = self._take(key, {})
         if not isinstance(value, dict):
             raise self.refuse(key, "a table")
@@ -115,12 +129,16 @@ class TomlTable:
         """
         for key in self._values:
             if key not in self._read:
-                known = ", ".join(sorted(self._read))
-                raise ScanFileError(f"{self.file}: {self._prefix}{key} is not a known key; known are {known}")
+                raise self._unknown(key, *self._read)
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number beyond all floats
+        return False
 
 
 def _range_text(above: float, at_least: float, at_most: float) -> str:

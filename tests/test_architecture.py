@@ -47,6 +47,7 @@ PROTOCOL_EDGE = {
     "protocol/quiet_start.py": {"os", "signal"},
     "protocol/conformance/__main__.py": {"pathlib"},
     "protocol/conformance/command_line.py": {"os"},
+    "protocol/data_file.py": {"pathlib"},
     "protocol/conformance/fixture.py": {"os", "pathlib", "subprocess"},
     "protocol/conformance/host_watch.py": {"os", "select", "threading", "time"},
     "protocol/conformance/ports.py": {"pathlib", "serial"},

@@ -22,9 +22,11 @@ from planner.arrays import FloatArray
 from planner.cell.cell import Probe
 from planner.cell.scan_path import looking_at
 from planner.cell.workpiece import Cylinder, Mould, Sphere
+from planner.errors import PathError
 
 # Distance of the waypoints filled in between corners, in mm or in degrees of the coordinate that moves most.
 _SPACING = 2.0
+_MOST_STRIPS = 1000
 
 
 @dataclass(frozen=True)
@@ -54,14 +56,27 @@ class StripLayout:
     def strip_centres(self, span_mm: float, line_width_mm: float) -> FloatArray:
         """Return the evenly spread middles of the fewest strips that cover a span about 0."""
         beyond = max(0.0, span_mm - line_width_mm)
-        count = 1 + math.ceil(beyond / self.pitch_mm(line_width_mm) - 1e-9)
+        count = 1 + strip_count(beyond, self.pitch_mm(line_width_mm))
         return np.linspace(-0.5 * beyond, 0.5 * beyond, count) if count > 1 else np.zeros(1)
+
+
+def strip_count(span: float, pitch: float) -> int:
+    """Return how many strips of that pitch cover a span.
+
+    Raises:
+        PathError: There are more than can be meant.
+    """
+    if not span < _MOST_STRIPS * pitch:
+        raise PathError(
+            f"the pattern has more than {_MOST_STRIPS:,} strips; is the probe's line_width_mm or the overlap wrong?"
+        )
+    return math.ceil(span / pitch - 1e-9)
 
 
 def sphere_meridians(sphere: Sphere, probe: Probe, layout: StripLayout) -> FloatArray:
     """Return a zigzag down one meridian and up the next, the line across the meridian."""
     radius = 0.5 * sphere.diameter_mm
-    count = math.ceil(2.0 * math.pi * radius / layout.pitch_mm(probe.line_width_mm))
+    count = strip_count(2.0 * math.pi * radius, layout.pitch_mm(probe.line_width_mm))
     ends = (layout.top_polar_deg, layout.lowest_polar_deg)
     corners = [
         (polar, 360.0 * strip / count) for strip in range(count) for polar in (ends if strip % 2 == 0 else ends[::-1])
@@ -79,6 +94,7 @@ def sphere_spiral(sphere: Sphere, probe: Probe, layout: StripLayout) -> FloatArr
     turn_deg = math.degrees(layout.pitch_mm(probe.line_width_mm) / (0.5 * sphere.diameter_mm))
     top, lowest = layout.top_polar_deg, layout.lowest_polar_deg
     turns = (lowest - top) / turn_deg
+    strip_count(turns, 1.0)
     corners = [(top, 0.0), (top, 360.0), (lowest, 360.0 * (turns + 1.0)), (lowest, 360.0 * (turns + 2.0))]
     polar, azimuth = np.radians(_filled(corners).T)
     down = np.column_stack((np.cos(polar) * np.cos(azimuth), np.cos(polar) * np.sin(azimuth), -np.sin(polar)))

@@ -1,7 +1,6 @@
 """A scan path: where the probe must be, as one pose per location in the workpiece frame, at a constant time step."""
 
 import csv
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +10,10 @@ from scipy.spatial.transform import Rotation, Slerp
 from planner.arrays import FloatArray
 from planner.errors import PathError
 from planner.geometry.transforms import first_not_rigid, from_xyz_yaw_pitch_roll, nearest_rigid
+from protocol.data_file import DataFileError, read_json, read_text, shown
+
+MOST_LOCATIONS = 20_000
+"""Beyond any path that can be meant: a day at one location every 4 s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +80,13 @@ def at_scan_speed(
     lengths = np.linalg.norm(np.diff(on_surface, axis=0), axis=1).max(axis=1)
     moving = np.concatenate(([True], lengths > 1e-9))
     waypoints, travelled = waypoints[moving], np.concatenate(([0.0], np.cumsum(lengths)))[moving]
-    count = max(2, 1 + round(travelled[-1] / (speed_mm_s * step_s)))
+    steps = travelled[-1] / (speed_mm_s * step_s)
+    if not steps < MOST_LOCATIONS:
+        raise PathError(
+            f"a path of {travelled[-1]:.0f} mm at scan_speed_mm_s {speed_mm_s:g} with time_step_s {step_s:g} has"
+            f" {steps:.3g} locations; at most {MOST_LOCATIONS:,} are allowed: scan faster, or in longer steps"
+        )
+    count = max(2, 1 + round(steps))
     if len(waypoints) < 2:
         raise PathError("the path does not move; it must have at least 2 different locations")
     at = np.linspace(0.0, travelled[-1], count)
@@ -98,16 +107,15 @@ def load_scan_path(file: Path, step_s: float) -> ScanPath:
     Raises:
         PathError: The file cannot be read, or a pose is not six or sixteen finite numbers, or not rigid.
     """
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise PathError(f"{file}: cannot be read ({error})") from error
-    if file.suffix.lower() == ".json":
-        rows = _rows_of_json(file, text)
-    elif file.suffix.lower() == ".csv":
-        rows = _rows_of_csv(file, text)
-    else:
+    kinds = {".csv": _rows_of_csv, ".json": _rows_of_json}
+    if file.suffix.lower() not in kinds:
         raise PathError(f"{file}: a path file must end in .csv or .json")
+    try:
+        rows = kinds[file.suffix.lower()](file)
+    except DataFileError as error:
+        raise PathError(str(error)) from error
+    if len(rows) > MOST_LOCATIONS:
+        raise PathError(f"{file}: holds {len(rows):,} poses; at most {MOST_LOCATIONS:,} are allowed")
     poses = [_pose(f"{file}: pose {i}", row) for i, row in enumerate(rows, 1)]
     try:
         return ScanPath(np.array(poses).reshape(-1, 4, 4), step_s)
@@ -115,29 +123,32 @@ def load_scan_path(file: Path, step_s: float) -> ScanPath:
         raise PathError(f"{file}: {error}") from error
 
 
-def _rows_of_csv(file: Path, text: str) -> list[list[float]]:
+def _rows_of_csv(file: Path) -> list[list[float]]:
     rows: list[list[float]] = []
-    for number, row in enumerate(csv.reader(text.splitlines()), 1):
+    try:
+        lines = list(csv.reader(read_text(file).splitlines()))
+    except csv.Error as error:
+        raise PathError(f"{file}: is not a CSV file: {error}") from error
+    for number, row in enumerate(lines, 1):
         if not any(cell.strip() for cell in row):
             continue
         try:
             rows.append([float(cell) for cell in row])
         except ValueError:
             if number > 1:
-                raise PathError(f"{file}: line {number} holds {','.join(row)!r}; numbers only are allowed") from None
+                raise PathError(
+                    f"{file}: line {number} holds {shown(','.join(row))}; numbers only are allowed"
+                ) from None
     return rows
 
 
-def _rows_of_json(file: Path, text: str) -> list[list[float]]:
-    try:
-        poses = json.loads(text)
-    except (ValueError, RecursionError) as error:  # json passes on that an integer is too long
-        raise PathError(f"{file}: not a JSON file: {error}") from error
+def _rows_of_json(file: Path) -> list[list[float]]:
+    poses = read_json(file)
     if not isinstance(poses, list):
         raise PathError(f"{file}: must hold a list of poses")
     try:
         return [np.asarray(one, dtype=np.float64).ravel().tolist() for one in poses]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise PathError(f"{file}: each pose must be 6 numbers, or a 4 x 4 matrix of numbers") from None
 
 

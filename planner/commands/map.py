@@ -7,6 +7,7 @@ from itertools import groupby
 from pathlib import Path
 
 from planner.cell.scan import load_scan
+from planner.cell.unit_hints import unit_hint
 from planner.commands import options
 from planner.errors import PlannerError
 from planner.kinematics.configuration import Configuration
@@ -41,7 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
     configurations = (
         list(Configuration) if arguments.configuration == "all" else [Configuration.parse(arguments.configuration)]
     )
-    problem = map_problem(load_scan(arguments.scan), progress_line("distance field", sys.stderr))
+    scan = load_scan(arguments.scan)
+    problem = map_problem(scan, progress_line("distance field", sys.stderr))
     maps = build_maps(problem, configurations, arguments.angles, progress_line("map", sys.stderr))
     drawn = most_reachable(maps)
     out: Path = arguments.out
@@ -53,6 +55,8 @@ def run(arguments: argparse.Namespace) -> int:
     except OSError as error:
         raise PlannerError(f"{out}: the map cannot be written there ({error.strerror or error})") from error
     sys.stdout.write(summary(problem.name, maps, drawn))
+    if not any(each.allowed.any() for each in maps.values()) and (hint := unit_hint(scan)) is not None:
+        sys.stdout.write(f"nothing can be reached: {hint}\n")
     return 0
 
 

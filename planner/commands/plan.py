@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from planner.cell.scan import Scan, load_scan
+from planner.cell.unit_hints import unit_hint
 from planner.commands import options
 from planner.errors import PlannerError
 from planner.execution.run_file import PLAN_FILE, RUN_RESULTS
@@ -82,7 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
     for label, outcome in comparison.outcomes.items():
         sys.stderr.write(configuration_line(label, outcome))
     if comparison.best is None:
-        sys.stdout.write(f"{scan.name}: there is no plan\n")
+        hint = unit_hint(scan)
+        sys.stdout.write(f"{scan.name}: there is no plan{f': {hint}' if hint else ''}\n")
         return _NO_PLAN
     chosen, plan = problems[comparison.best], comparison.outcomes[comparison.best]
     assert isinstance(plan, Plan)

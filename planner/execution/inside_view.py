@@ -86,7 +86,7 @@ class ControlView:
         try:
             self._socket.sendall(json.dumps({"command": command}).encode() + b"\n")
             answer: dict[str, Any] = json.loads(self._replies.readline())
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise self._silent(error) from error
         return answer
 

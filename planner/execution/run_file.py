@@ -24,6 +24,7 @@ from planner.map.map_file import MAP_FILE
 from planner.table.velocity_profile import MotionCommand
 from planner.table.wire import Wire
 from planner.whole_file import whole_file, write_whole
+from protocol.data_file import DataFileError, read_json
 
 _FORMAT = "seventh-axis run"
 _FORMAT_VERSION = 1
@@ -143,7 +144,7 @@ def load_run(folder: Path) -> StoredRun:
         PlannerError: there is none, or it is damaged.
     """
     try:
-        document = json.loads((folder / RUN_FILE).read_text(encoding="utf-8"))
+        document = read_json(folder / RUN_FILE)
         if (document["format"], document["format_version"]) != (_FORMAT, _FORMAT_VERSION):
             raise RunFileError(f"{folder / RUN_FILE}: is not a run of format version {_FORMAT_VERSION}")
         conditions = _conditions(document["conditions"])
@@ -158,7 +159,9 @@ def load_run(folder: Path) -> StoredRun:
         raise RunFileError(
             f"{folder}: holds no run ({error.strerror or error}); python -m planner run writes one"
         ) from error
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except DataFileError as error:
+        raise RunFileError(f"{error}; python -m planner run writes a folder with {RUN_FILE}") from error
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, csv.Error) as error:
         raise RunFileError(f"{folder}: its run is damaged: {type(error).__name__}, {error}") from error
     run_input = load_run_input(folder / PLAN_FILE).turned(conditions.turns)
     motion = TableMotion(run_input.plan, run_input.problem.limits, conditions.pause_times)

@@ -18,6 +18,7 @@ from planner.planning.problem import Problem
 from planner.planning.verification import verify
 from planner.table.cost import Weights
 from planner.table.motion import Limits, next_angle, next_speed
+from protocol.data_file import read_json
 
 _ROUNDING = 1e-6
 
@@ -66,7 +67,7 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
     plan = load_plan(plan_file)
     map_file = map_file or plan_file.with_name(MAP_FILE)
     try:
-        document = json.loads(plan_file.read_text(encoding="utf-8"))
+        document = read_json(plan_file)
         name = str(document["provenance"]["scan"])
         limits = Limits(**{key: float(value) for key, value in document["limits"].items()})
         weights = Weights(float(document["weights"]["k_a"]), float(document["weights"]["k_w"]))
@@ -77,7 +78,7 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
                 f" plan anew with python -m planner plan {name} --out {plan_file.parent}"
             )
         planned_arm = PlannedArm.read(document)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise RunInputError(f"{plan_file}: is damaged: {type(error).__name__}, {error}") from error
     except (ArmTableError, PoseError) as error:
         raise RunInputError(f"{plan_file}: is damaged: {error}") from error

@@ -6,6 +6,7 @@ Memory grows with the maps alone.
 """
 
 import hashlib
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import NamedTuple
@@ -32,7 +33,7 @@ from planner.kinematics.value import (
     joints_value,
     wrist_factor,
 )
-from planner.map.config_map import DEFAULT_EPSILON, ConfigurationMap
+from planner.map.config_map import DEFAULT_EPSILON, ConfigurationMap, ConfigurationMapError
 from planner.map.map_problem import MapProblem
 from planner.map.map_reasons import FIRST_PAIR, FIRST_USER_FACTOR, reason_texts
 from planner.progress import Progress
@@ -43,6 +44,8 @@ _SINGULAR = int(Reason.SINGULAR)
 _JOINT_1_LIMIT = int(Reason.JOINT_1_LIMIT)
 
 _NO_POSES = np.empty((0, 0, 0, 6)), np.empty((0, 0, 0))
+_MOST_CELLS = 50_000_000
+"""Half a gigabyte."""
 _BLOCK_CELLS = 16_384
 """Cells between two reports of progress: a few milliseconds, and a bound on what user factors are handed at once."""
 
@@ -63,6 +66,7 @@ def build_maps(
             the work.
 
     Raises:
+        ConfigurationMapError: The maps would have too many cells.
         ValueError: A user's factor gave a wrong shape, or something else than numbers in 0..1; or there are more user
             factors or pairs than a map can tell apart.
     """
@@ -71,6 +75,12 @@ def build_maps(
     texts = reason_texts(problem.pair_names, user_names)
     n_locations = len(problem.T_WS)
     shape = (len(configurations), n_locations, n_angles)
+    if math.prod(shape) > _MOST_CELLS:
+        raise ConfigurationMapError(
+            f"{len(configurations)} map(s) of {n_locations:,} locations and {n_angles:,} angles have"
+            f" {math.prod(shape):,} cells; at most {_MOST_CELLS:,} are allowed: take fewer angles, longer time steps,"
+            " or one configuration"
+        )
     values, reasons = np.empty(shape), np.empty(shape, dtype=np.uint8)
     cells = _cells(problem, configurations, n_angles)
     block = max(1, _BLOCK_CELLS // n_angles)

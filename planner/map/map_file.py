@@ -26,6 +26,13 @@ _FORMAT = "seventh-axis configuration maps"
 _FORMAT_VERSION = 1
 
 
+# What numpy raises for an npz file that is cut off, foreign, or claims arrays of any size.
+_DAMAGED = (
+    ValueError, EOFError, KeyError, AttributeError, TypeError, MemoryError, RecursionError, OverflowError,
+    NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+
+
 class MapFileError(PlannerError):
     """A file that cannot be read, is damaged, or holds no configuration maps."""
 
@@ -75,7 +82,7 @@ def load_maps(file: Path) -> dict[Configuration, ConfigurationMap]:
         }
     except ConfigurationMapError as error:
         raise MapFileError(f"{file}: damaged: {error}") from error
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         raise MapFileError(f"{file}: holds no configuration maps that this program has written") from error
 
 
@@ -85,7 +92,7 @@ def _read(file: Path) -> dict[str, Any]:
             return {name: stored[name] for name in stored.files}
     except OSError as error:
         raise MapFileError(f"{file}: cannot be read ({error.strerror or error})") from error
-    except (ValueError, EOFError, KeyError, AttributeError, TypeError, zipfile.BadZipFile, zlib.error) as error:
+    except _DAMAGED as error:
         raise MapFileError(f"{file}: is damaged, or not an npz file at all") from error
 
 

@@ -17,6 +17,7 @@ from planner.planning.verification import verify
 from planner.software_version import software_version
 from planner.table.cost import PathCost
 from planner.whole_file import write_whole
+from protocol.data_file import DataFileError, read_json
 
 _FORMAT = "seventh-axis plan"
 _FORMAT_VERSION = 1
@@ -82,7 +83,7 @@ def load_plan(file: Path) -> Plan:
         PlanFileError: the file cannot be read, or is no plan of this format.
     """
     try:
-        document = json.loads(file.read_text(encoding="utf-8"))
+        document = read_json(file)
         if (document["format"], document["format_version"]) != (_FORMAT, _FORMAT_VERSION):
             raise PlanFileError(f"{file}: is not a plan of format version {_FORMAT_VERSION}")
         table, cost = document["table"], dict(document["cost"])
@@ -97,9 +98,9 @@ def load_plan(file: Path) -> Plan:
             cost=PathCost(**cost),
             pauses=tuple(Pause(**pause) for pause in table["pauses"]),
         )
-    except OSError as error:
-        raise PlanFileError(f"{file}: cannot be read ({error.strerror or error})") from error
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except DataFileError as error:
+        raise PlanFileError(str(error)) from error
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise PlanFileError(f"{file}: holds no plan that this program has written") from error
     if not len(plan.angles_deg) == len(plan.speeds_deg_s) == len(plan.accelerations_deg_s2) + 1:
         raise PlanFileError(f"{file}: is damaged: angles, speeds and accelerations do not belong together")

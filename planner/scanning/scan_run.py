@@ -16,6 +16,7 @@ import trimesh
 from planner.arrays import FloatArray
 from planner.cell.cell import placement
 from planner.cell.scan import Scan
+from planner.cell.unit_hints import unit_hint
 from planner.errors import PlannerError
 from planner.execution.execute import Settings
 from planner.execution.inside_view import ControlView
@@ -147,7 +148,8 @@ def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: Progre
     problems = {each.label: Problem(map_, scan.path.step_s, limits, weights) for each, map_ in maps.items()}
     comparison = best_configuration(problems, PLANNERS[DEFAULT_PLANNER])
     if comparison.best is None:
-        raise ScanError(f"{scan.name}: there is no plan; python -m planner plan {scan.name} tells why")
+        hint = unit_hint(scan) or f"python -m planner plan {scan.name} tells why"
+        raise ScanError(f"{scan.name}: there is no plan; {hint}")
     plan = comparison.outcomes[comparison.best]
     assert isinstance(plan, Plan)
     joints = arm_motion(scan, Configuration.parse(comparison.best), plan)

@@ -1,7 +1,5 @@
 """The profile: what is known of the table under test, and how far and fast it may be moved."""
 
-import math
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -16,8 +14,13 @@ from protocol.conformance.profile_sections import (
     TableProfile,
     Tolerance,
 )
+from protocol.data_file import DataFileError, did_you_mean, read_toml, shown
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
+
+
+_LARGEST = 1e300
+"""A whole number may be beyond all floats."""
 
 
 class ProfileError(ValueError):
@@ -93,24 +96,25 @@ def profile_from(values: Mapping[str, Any], source: str) -> Profile:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ProfileError(f"{path}: cannot be read: {error}") from error
-    except (ValueError, RecursionError) as error:  # tomllib passes on that an integer is too long
-        raise ProfileError(f"{path}: is not TOML: {error}") from error
+        return read_toml(path)
+    except DataFileError as error:
+        raise ProfileError(str(error)) from error
 
 
 def _merged(defaults: dict[str, Any], changes: Mapping[str, Any], source: str) -> dict[str, Any]:
     merged = dict(defaults)
     for section, keys in changes.items():
         if section not in defaults:
-            raise ProfileError(f"{source}: [{section}] is no section; there are {', '.join(defaults)}")
+            raise ProfileError(
+                f"{source}: [{section}] is no section; there are {', '.join(defaults)}{did_you_mean(section, defaults)}"
+            )
         if not isinstance(keys, dict):
-            raise ProfileError(f"{source}: {section} must be a section, not {keys!r}")
+            raise ProfileError(f"{source}: {section} must be a section, not {shown(keys)}")
         unknown = [key for key in keys if section != "waive" and key not in defaults[section]]
         if unknown:
             raise ProfileError(
                 f"{source}: {section}.{unknown[0]} is not a key; allowed are {', '.join(defaults[section])}"
+                f"{did_you_mean(unknown[0], defaults[section])}"
             )
         merged[section] = defaults[section] | keys
     return merged
@@ -131,17 +135,19 @@ def _value(wanted: object, value: object, where: str) -> object:
     """Return a value of the wanted type; all numbers of a profile are at least 0."""
     if wanted is bool or wanted is str:
         if not isinstance(value, wanted):
-            raise ProfileError(f"{where} is {value!r}; it must be {'true or false' if wanted is bool else 'a text'}")
+            raise ProfileError(
+                f"{where} is {shown(value)}; it must be {'true or false' if wanted is bool else 'a text'}"
+            )
         return value
     if wanted is int or wanted is float:
         kinds = (int,) if wanted is int else (int, float)
-        if not isinstance(value, kinds) or isinstance(value, bool) or not 0 <= value < math.inf:
+        if not isinstance(value, kinds) or isinstance(value, bool) or not 0 <= value <= _LARGEST:
             raise ProfileError(
-                f"{where} is {value!r}; it must be a {'whole number' if wanted is int else 'number'} from 0 up"
+                f"{where} is {shown(value)}; it must be a {'whole number' if wanted is int else 'number'} from 0 up"
             )
         return wanted(value)
     if not isinstance(value, list | tuple) or not all(isinstance(word, str) for word in value):
-        raise ProfileError(f"{where} is {value!r}; it must be a list of words")
+        raise ProfileError(f"{where} is {shown(value)}; it must be a list of words")
     return tuple(value)
 
 

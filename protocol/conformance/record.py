@@ -17,6 +17,7 @@ from protocol.conformance.reference import Expectation, MotionRecord, Sample
 from protocol.conformance.suite import Outcome
 from protocol.conformance.verdict import Measurement, Verdict
 from protocol.conformance.wire import Event
+from protocol.data_file import DataFileError, read_json
 
 FORMAT = "seventh-axis conformance record"
 VERSION = 1
@@ -103,9 +104,9 @@ def read_record(path: Path) -> Record:
         RecordError: the file cannot be read, or is no record of this version.
     """
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise RecordError(f"{path}: cannot be read: {error}") from error
+        record = read_json(path)
+    except DataFileError as error:
+        raise RecordError(str(error)) from error
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         raise RecordError(f"{path}: is no {FORMAT}")
     if record.get("version") != VERSION:
@@ -115,7 +116,7 @@ def read_record(path: Path) -> Record:
             RecordedCase(case["id"], tuple(_event(*event) for event in case["wire"])) for case in record["cases"]
         )
         return Record(profile_from(record["profile"], str(path)), int(record["home_deg"]), cases)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         if isinstance(error, ProfileError):
             raise RecordError(str(error)) from error
         raise RecordError(f"{path}: is damaged: {type(error).__name__} {error}") from error

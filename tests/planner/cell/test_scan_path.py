@@ -84,7 +84,7 @@ def test_a_path_is_read_from_a_file(tmp_path: Path, name: str, text: str) -> Non
         ("path.csv", "0,0,100,0,180,0\n0,0,x,0,180,0\n", "line 2 holds '0,0,x,0,180,0'"),
         ("path.csv", "0,0,100,0,180\n0,0,100,0,180\n", "pose 1 has 5 numbers"),
         ("path.csv", "0,0,100,0,180,0\n0,0,nan,0,180,0\n", "pose 2 holds a value that is not a finite number"),
-        ("path.json", "{", "not a JSON file"),
+        ("path.json", "{", "is not JSON"),
         ("path.json", "{}", "must hold a list"),
         ("path.json", '[["a"], [1]]', "each pose must be"),
         ("path.json", json.dumps([SIX[0], (2 * POSES[1]).tolist()]), "pose 2 has a last row other than 0 0 0 1"),
