@@ -24,7 +24,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     """Add the command to `python -m planner`."""
     parser = commands.add_parser(
         "scan",
-        help="scan a workpiece with a simulated probe, and account for the cloud's error",
+        help="scan a workpiece with a simulated probe, and compute the error budget of its cloud",
         description="Plan a scan, move the table, take laser profiles and align them to one cloud; exit status 1 when"
         " it ended early.",
         epilog="example: python -m planner scan cylinder --decimals 3 --out build/cylinder",
