@@ -121,8 +121,8 @@ def test_a_way_on_that_stays_free_is_said_to() -> None:
 
 
 def test_a_region_that_only_the_way_on_meets_is_named_with_its_first_moment() -> None:
-    """The region is there at location 11 only, ahead of the table."""
-    verdict = judged(blocks_map(21, 360, [(11, 11, 57, 80)]))
+    """The region is there at location 11 only, just ahead of the table, which is at 52.5 deg then."""
+    verdict = judged(blocks_map(21, 360, [(11, 11, 54, 80)]))
     assert 0 < verdict.forbidden_moments < 100
     # With the arm between 10 and 11 it may already stand at 11.
     assert verdict.first_location == 10
