@@ -4,7 +4,7 @@ Keys carry their units; placements are x y z in mm and yaw pitch roll in degrees
 looked for beside it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -19,7 +19,7 @@ from planner.cell.patterns import PATTERNS, StripLayout
 from planner.cell.scan_path import ScanPath, at_scan_speed, load_scan_path
 from planner.cell.workpiece import CLASSES, Workpiece
 from planner.errors import PlannerError, ScanFileError, WorkpieceError
-from planner.geometry.mesh import load_mesh, radius_about_axis_mm, size_fault
+from planner.geometry.mesh import MILLIMETRES, load_mesh, radius_about_axis_mm, size_fault
 from planner.kinematics.arm import Arm
 from planner.kinematics.value import ValueFunction
 from planner.table.cost import Weights, default_weights
@@ -65,8 +65,12 @@ def shipped_scans() -> list[str]:
     return sorted(file.stem for file in _SHIPPED.glob("*.toml"))
 
 
-def load_scan(scan: str | Path) -> Scan:
+def load_scan(scan: str | Path, say: Callable[[str], None] | None = None) -> Scan:
     """Return the scan of a TOML file, or a shipped one by its name.
+
+    Args:
+        scan: The file, or the name.
+        say: Called with one line when harmless flaws of the workpiece's mesh were mended.
 
     Raises:
         PlannerError: A file cannot be read, or holds a key, value or shape that is not allowed; the message names it.
@@ -78,7 +82,7 @@ def load_scan(scan: str | Path) -> Scan:
     top = TomlTable.load(file)
     with _named(file):
         cell, bodies = _read_cell(top.table("cell"), file.parent)
-        workpiece, mesh, mesh_file = _read_workpiece(top.table("workpiece"), file.parent)
+        workpiece, mesh, mesh_file = _read_workpiece(top.table("workpiece"), file.parent, say)
         _check_it_fits_the_table(mesh, cell)
         path = _read_path(top.table("path"), file.parent, cell.probe, workpiece)
         value = ValueFunction.read(top.table("value"))
@@ -88,13 +92,13 @@ def load_scan(scan: str | Path) -> Scan:
     return Scan(file.stem, cell, bodies, workpiece, mesh, mesh_file, path, value, limits, weights)
 
 
-def with_mesh(scan: Scan, file: Path) -> Scan:
-    """Return the scan with the workpiece of another file in the place of its own.
+def with_mesh(scan: Scan, file: Path, unit: str | None = None, say: Callable[[str], None] | None = None) -> Scan:
+    """Return the scan with the workpiece of another file in the place of its own; see `load_mesh`.
 
     Raises:
         WorkpieceError: The mesh cannot be a workpiece, or does not fit the table.
     """
-    mesh = load_mesh(file)
+    mesh = load_mesh(file, unit, say)
     with _named(file):
         _check_it_fits_the_table(mesh, scan.cell)
     return replace(scan, workpiece=None, mesh=mesh, mesh_file=file)
@@ -159,19 +163,22 @@ def _read_probe(section: TomlTable) -> Probe:
     return probe
 
 
-def _read_workpiece(section: TomlTable, folder: Path) -> tuple[Workpiece | None, trimesh.Trimesh, Path | None]:
+def _read_workpiece(
+    section: TomlTable, folder: Path, say: Callable[[str], None] | None
+) -> tuple[Workpiece | None, trimesh.Trimesh, Path | None]:
     if "mesh" in section:
         mesh_file = folder / section.text("mesh")
         kind = section.choice("class", (*CLASSES, "other"), "other")
+        unit = section.choice("unit", tuple(MILLIMETRES)) if "unit" in section else None
         section.finish()
-        mesh = load_mesh(mesh_file)
+        mesh = load_mesh(mesh_file, unit, say)
         return (CLASSES[kind].measured(mesh) if kind != "other" else None), mesh, mesh_file
     shape = CLASSES[section.choice("class", tuple(CLASSES))]
     names = [item.name for item in fields(shape) if item.name != "middle_mm"]
     workpiece = shape(middle_mm=(0.0, 0.0, 0.0), **{name: section.number(name, above=0.0) for name in names})
     section.finish()
     mesh = workpiece.mesh()
-    fault = size_fault(mesh)
+    fault = size_fault(np.asarray(mesh.extents))
     if fault is not None:
         raise WorkpieceError(fault)
     return workpiece, mesh, None

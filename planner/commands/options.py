@@ -1,6 +1,7 @@
 """Options that several commands have, and the numbers that options take."""
 
 import argparse
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -83,6 +84,11 @@ def fresh_table(url: str, **wanted: int) -> str:
     told = url.partition("?")[2]
     missing = [f"{key}={value}" for key, value in wanted.items() if f"{key}=" not in told]
     return "emulator://?" + "&".join(([told] if told else []) + missing)
+
+
+def say(line: str) -> None:
+    """Print a line for people beside the command's results, such as what was mended in a mesh."""
+    sys.stderr.write(line + "\n")
 
 
 def whole_number(least: int, most: int) -> Callable[[str], int]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from planner.cell.scan import load_scan, with_mesh
 from planner.commands import options
 from planner.errors import PlannerError
+from planner.geometry.mesh import MILLIMETRES
 from planner.progress import progress_line
 from planner.scanning.latched_run import TriggerConditions
 from planner.scanning.scan_file import save_scan, scan_document
@@ -30,7 +31,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         epilog="example: python -m planner scan cylinder --decimals 3 --out build/cylinder",
     )
     options.add_scan(parser)
-    parser.add_argument("--mesh", type=Path, metavar="FILE", help="another workpiece in the place of the scan's")
+    parser.add_argument("--mesh", type=Path, metavar="FILE", help="replace the workpiece by this mesh")
+    parser.add_argument("--unit", choices=tuple(MILLIMETRES), help="unit of length in --mesh (default mm)")
     parser.add_argument(
         "--port", metavar="URL", default="emulator://",
         help="emulator:// for a table in simulated time (the default), or a stand-in's port along with --control",
@@ -60,9 +62,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 def run(arguments: argparse.Namespace) -> int:
     """Scan, write cloud, figures and report, print what it came to, and return the exit status."""
     set_aside(arguments.out, SCAN_RESULTS, keep=() if arguments.mesh is None else (arguments.mesh,))
-    scan = load_scan(arguments.scan)
+    scan = load_scan(arguments.scan, options.say)
     if arguments.mesh is not None:
-        scan = with_mesh(scan, arguments.mesh)
+        scan = with_mesh(scan, arguments.mesh, arguments.unit, options.say)
     asked = ScanOptions(
         port=options.fresh_table(arguments.port, decimals=arguments.decimals, seed=arguments.seed),
         baud=arguments.baud,

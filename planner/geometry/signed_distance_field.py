@@ -17,12 +17,15 @@ from numpy.typing import NDArray
 
 from planner.arrays import FloatArray
 from planner.geometry.bounding_volume_hierarchy import bounding_volume_hierarchy, nearest_triangle
+from planner.geometry.shells import turned_outward
 from planner.geometry.winding_number import BESIDE, winding_numbers
 from planner.kernel import cache_directory, kernel
 from planner.progress import Progress
 from planner.whole_file import whole_file
 
 _MOST_POINTS = 4_000_000
+_RULES = b"signs by the nesting of shells"
+"""Part of a stored field's name, so that fields built by other rules are not read back."""
 _STEP = 0.25
 """Shortest stride of the walk along a segment, in grid spacings."""
 
@@ -49,7 +52,8 @@ def build_field(mesh: trimesh.Trimesh, spacing_mm: float, progress: Progress | N
     """Return the signed distance field of a watertight mesh; the grid reaches a cell beyond it on each side.
 
     The values are exact to the rounding of float32, but for points outside within a thousandth of the spacing of the
-    surface, which count as inside. So no value is above the true one.
+    surface, which count as inside. So no value is above the true one. Which side of the surface is inside follows from
+    how its shells are nested (see `planner.geometry.shells`), whichever way round their triangles are written.
 
     Args:
         mesh: The mesh, in mm.
@@ -58,6 +62,7 @@ def build_field(mesh: trimesh.Trimesh, spacing_mm: float, progress: Progress | N
 
     Raises:
         ValueError: The spacing is not positive, or so small that the grid would not fit in memory.
+        WorkpieceError: The surface has no inside.
     """
     if not spacing_mm > 0.0:
         raise ValueError(f"the spacing of a distance field is {spacing_mm:g} mm, it must be above 0")
@@ -70,12 +75,14 @@ def build_field(mesh: trimesh.Trimesh, spacing_mm: float, progress: Progress | N
         )
     origin = (lower + upper) / 2 - (shape - 1) * spacing_mm / 2
     values = np.empty(tuple(shape), dtype=np.float32)
-    triangles = np.asarray(mesh.triangles, dtype=np.float64)
+    triangles = np.array(mesh.triangles, dtype=np.float64)
     hierarchy = bounding_volume_hierarchy(triangles)
     for i in range(shape[0]):
         _write_distances(*hierarchy, origin, spacing_mm, i, values[i])
         if progress is not None:
             progress((i + 1) * values[0].size, values.size)
+    turned = turned_outward(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    triangles[turned] = triangles[turned, ::-1]
     inside = winding_numbers(triangles, origin, spacing_mm, values.shape) > 0
     inside |= values < hypot(*BESIDE) * spacing_mm
     values[inside] *= -1.0
@@ -123,7 +130,7 @@ def _cache_folder() -> Path:
 
 
 def _digest(mesh: trimesh.Trimesh, spacing_mm: float) -> str:
-    content = hashlib.sha256(np.float64(spacing_mm).tobytes())
+    content = hashlib.sha256(_RULES + np.float64(spacing_mm).tobytes())
     content.update(np.ascontiguousarray(mesh.vertices, dtype=np.float64).tobytes())
     content.update(np.ascontiguousarray(mesh.faces, dtype=np.int64).tobytes())
     return content.hexdigest()[:32]
@@ -180,7 +187,8 @@ def field_distance(
     # Half a cell's diagonal from the look-up, half a shortest stride from the walk.
     error = (0.5 * sqrt(3.0) + 0.5 * _STEP) * spacing
     middle = look_up(values, origin, spacing, ax + 0.5 * ux, ay + 0.5 * uy, az + 0.5 * uz)
-    least = min(enough_mm + error, middle)
+    free = enough_mm + error
+    least = min(free, middle)
     for end in (-0.5, 0.5):
         t = 0.5 + end
         last = look_up(values, origin, spacing, ax + t * ux, ay + t * uy, az + t * uz)
@@ -192,4 +200,5 @@ def field_distance(
             t = 0.5 + end * (along / half)
             value = look_up(values, origin, spacing, ax + t * ux, ay + t * uy, az + t * uz)
             least = min(least, value)
-    return least - error
+    # `free - error` need not be `enough_mm`: in floating point it may be less, and would block a free segment.
+    return least - error if least < free else enough_mm

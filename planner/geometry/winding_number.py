@@ -64,3 +64,19 @@ def _count_crossings(triangles: FloatArray, crossings: NDArray[np.int32]) -> Non
                 below = min(ceil(height), nz) - 1
                 if below >= 0:
                     crossings[i, j, below] += 1 if up else -1
+
+
+def solid_angles(triangles: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the solid angle `(m,)` in steradian that a surface fills, seen from points `(m, 3)`.
+
+    Seen from inside a closed surface it is 4 pi, from outside 0 (van Oosterom and Strackee, 1983).
+
+    Args:
+        triangles: `(n, 3, 3)`, counterclockwise seen from outside.
+        points: `(m, 3)`.
+    """
+    a, b, c = (triangles[:, corner] - points[:, np.newaxis] for corner in range(3))
+    la, lb, lc = (np.linalg.norm(side, axis=2) for side in (a, b, c))
+    volume = np.einsum("mni,mni->mn", a, np.cross(b, c))
+    ab, bc, ca = (np.einsum("mni,mni->mn", p, q) for p, q in ((a, b), (b, c), (c, a)))
+    return np.asarray(2.0 * np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb).sum(axis=1))

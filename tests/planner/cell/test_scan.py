@@ -146,3 +146,28 @@ def test_a_fault_of_the_mesh_names_both_files(tmp_path: Path) -> None:
         load_scan(file)
     assert "scan.toml" in str(refusal.value)
     assert "part.stl" in str(refusal.value)
+
+
+def test_the_unit_of_a_mesh_is_a_key_of_the_workpiece(tmp_path: Path) -> None:
+    inches = load_scan("cylinder").mesh.copy()
+    inches.apply_scale(1 / 25.4)
+    inches.export(tmp_path / "part.stl")
+    file = changed(tmp_path, "cylinder", "diameter_mm = 140\nheight_mm = 180", 'mesh = "part.stl"')
+    with pytest.raises(WorkpieceError, match=r"or inches\? Then set unit in \[workpiece\]"):
+        load_scan(file)
+    file.write_text(file.read_text().replace('mesh = "part.stl"', 'mesh = "part.stl"\nunit = "inch"'))
+    np.testing.assert_allclose(load_scan(file).mesh.extents, load_scan("cylinder").mesh.extents, rtol=1e-6)
+    file.write_text(file.read_text().replace('"inch"', '"furlong"'))
+    with pytest.raises(ScanFileError, match=r"workpiece.unit is 'furlong'; it must be one of mm, cm, m, inch"):
+        load_scan(file)
+
+
+def test_what_is_mended_in_a_mesh_is_said(tmp_path: Path) -> None:
+    mesh = load_scan("cylinder").mesh.copy()
+    mesh.invert()
+    mesh.export(tmp_path / "part.stl")
+    file = changed(tmp_path, "cylinder", "diameter_mm = 140\nheight_mm = 180", 'mesh = "part.stl"')
+    said: list[str] = []
+    load_scan(file, said.append)
+    load_scan("cylinder", said.append)
+    assert said == [f"{tmp_path / 'part.stl'}: turned {len(mesh.faces)} inside-out triangles"]

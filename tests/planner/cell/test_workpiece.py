@@ -6,7 +6,7 @@ import pytest
 
 from planner.cell.workpiece import Cylinder, Mould, Sphere, Workpiece
 from planner.errors import WorkpieceError
-from planner.geometry.mesh import mesh_fault
+from planner.geometry.mesh import sound_mesh
 
 SPHERE = Sphere(160.0, middle_mm=(5.0, -10.0, 20.0))
 CYLINDER = Cylinder(140.0, 180.0, middle_mm=(5.0, -10.0, 20.0))
@@ -16,7 +16,8 @@ MOULD = Mould(300.0, 200.0, 80.0, 240.0, 140.0, 50.0, middle_mm=(5.0, -10.0, 20.
 @pytest.mark.parametrize("workpiece", [SPHERE, CYLINDER, MOULD])
 def test_each_class_gives_a_sound_mesh_that_measures_as_it_was_made(workpiece: Workpiece) -> None:
     mesh = workpiece.mesh()
-    assert mesh_fault(mesh) is None
+    _, mended = sound_mesh(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    assert mended == ()
     measured = dataclasses.astuple(type(workpiece).measured(mesh))
     given = dataclasses.astuple(workpiece)
     np.testing.assert_allclose(np.hstack(measured), np.hstack(given), atol=1e-6)

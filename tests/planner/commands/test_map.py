@@ -1,10 +1,15 @@
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from planner.__main__ import main
+from planner.cell.scan import load_scan
+from planner.cell.workpiece import Cylinder
 from planner.kinematics.configuration import Configuration
+from planner.map.map_builder import build_maps
 from planner.map.map_file import load_maps
+from planner.map.map_problem import map_problem
 
 SMALL = ["--angles", "24"]
 
@@ -68,3 +73,48 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path, capsys: pytest.
     (tmp_path / "file").write_text("not a folder")
     assert main(["map", "cylinder", *SMALL, "--out", str(tmp_path / "file" / "out")]) == 2
     assert "cannot be written" in capsys.readouterr().err
+
+
+SCAN_OF_A_MESH = """
+[workpiece]
+class = "cylinder"
+mesh = "part.stl"
+[path]
+pattern = "rings"
+bottom_margin_mm = 60
+scan_speed_mm_s = 60
+time_step_s = 1
+"""
+
+
+def scan_of(mesh: trimesh.Trimesh, folder: Path) -> Path:
+    (folder / "part.stl").write_bytes(mesh.export(file_type="stl"))
+    (folder / "scan.toml").write_text(SCAN_OF_A_MESH)
+    return folder / "scan.toml"
+
+
+def test_what_is_mended_in_a_mesh_is_one_line_on_stderr(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    part = Cylinder(140.0, 150.2).mesh()
+    part.invert()
+    assert main(["map", str(scan_of(part, tmp_path)), *SMALL, "--out", str(tmp_path)]) == 0
+    shown = capsys.readouterr()
+    assert shown.err == f"{tmp_path / 'part.stl'}: turned {len(part.faces)} inside-out triangles\n"
+
+
+def test_a_mesh_that_cannot_be_used_is_one_line_and_status_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = scan_of(Cylinder(140.0, 150.2).mesh(), tmp_path)
+    for content in (b"", b"solid \xe4\n", (tmp_path / "part.stl").read_bytes()[:-60]):
+        (tmp_path / "part.stl").write_bytes(content)
+        assert main(["map", str(file), *SMALL, "--out", str(tmp_path / "out")]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith(f"{file}: {tmp_path / 'part.stl'}: ")
+        assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("height_mm", [150.0, 150.2, 150.4, 163.7, 181.3])
+def test_a_cylinder_of_any_height_is_reached_as_well(height_mm: float, tmp_path: Path) -> None:
+    scan = load_scan(scan_of(Cylinder(140.0, height_mm).mesh(), tmp_path))
+    slot = Configuration.LEFTY_ABOVE_NOFLIP
+    assert build_maps(map_problem(scan), [slot], 48)[slot].blocked_locations == ()

@@ -69,6 +69,15 @@ PARTS: dict[str, Callable[[], trimesh.Trimesh]] = {
 }
 
 
+def test_a_field_built_by_other_rules_is_not_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = trimesh.creation.box((20, 30, 40))
+    monkeypatch.setattr("planner.geometry.signed_distance_field._RULES", b"older")
+    cached_field(mesh, 5.0, folder=tmp_path)
+    monkeypatch.undo()
+    cached_field(mesh, 5.0, folder=tmp_path)
+    assert len(list(tmp_path.iterdir())) == 2
+
+
 def grid_points(field: SignedDistanceField) -> NDArray[np.float64]:
     return field.origin_mm + field.spacing_mm * np.moveaxis(np.indices(field.values_mm.shape), 0, -1).reshape(-1, 3)
 
@@ -138,6 +147,62 @@ def test_a_bound_keeps_what_is_below_it(a: tuple[float, ...], b: tuple[float, ..
         assert bounded == pytest.approx(exact, abs=0.25 * SPACING_MM)
     else:
         assert bounded >= enough_mm - 0.5 * SPACING_MM
+    if exact >= enough_mm:
+        assert bounded >= enough_mm
+
+
+@settings(deadline=None, max_examples=300)
+@given(
+    spacing_mm=st.floats(1e-3, 100.0),
+    enough_mm=st.floats(-10.0, 500.0),
+    a=point,
+    b=point,
+)
+def test_a_free_segment_gets_at_least_what_was_asked_for_any_spacing(
+    spacing_mm: float, enough_mm: float, a: tuple[float, ...], b: tuple[float, ...]
+) -> None:
+    far = SignedDistanceField(np.full((3, 3, 3), 1e4, np.float32), np.zeros(3), spacing_mm)
+    assert field_distance(*far, *a, *b, enough_mm) >= enough_mm
+
+
+def random_part(kind: str, sizes_mm: tuple[float, float, float]) -> trimesh.Trimesh:
+    if kind == "box":
+        return trimesh.creation.box(sizes_mm)
+    if kind == "cylinder":
+        return trimesh.creation.cylinder(radius=sizes_mm[0] / 2, height=sizes_mm[1], sections=12)
+    return trimesh.creation.icosphere(subdivisions=1, radius=sizes_mm[0] / 2)
+
+
+size = st.floats(10.0, 400.0)
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    kind=st.sampled_from(["box", "cylinder", "sphere"]),
+    sizes_mm=st.tuples(size, size, size),
+    place_mm=st.tuples(coordinate, coordinate, coordinate),
+    points=st.integers(200, 1500),
+    enough_mm=st.sampled_from([2.0, 5.0, 30.0, 47.3]),
+    seed=st.integers(0, 1000),
+)
+def test_any_part_on_any_grid_blocks_no_segment_that_is_free_of_it(
+    kind: str,
+    sizes_mm: tuple[float, float, float],
+    place_mm: tuple[float, float, float],
+    points: int,
+    enough_mm: float,
+    seed: int,
+) -> None:
+    """A segment beside the part's box, as far off as was asked and 2.5 grid spacings more."""
+    mesh = random_part(kind, sizes_mm)
+    mesh.apply_translation(place_mm)
+    field = build_field(mesh, float(np.cbrt(np.prod(mesh.extents) / points)))
+    rng = np.random.default_rng(seed)
+    off_mm = enough_mm + 2.5 * field.spacing_mm
+    for axis in range(3):
+        a, b = rng.uniform(mesh.bounds[0] - 50.0, mesh.bounds[1] + 50.0, (2, 3))
+        a[axis] = b[axis] = mesh.bounds[1, axis] + off_mm
+        assert field_distance(*field, *a.tolist(), *b.tolist(), enough_mm) >= enough_mm
 
 
 def test_a_field_is_built_once_and_read_back_the_same(tmp_path: Path) -> None:
