@@ -67,12 +67,13 @@ def _first_overlap(mesh: trimesh.Trimesh, pairs: IndexArray, depth: float) -> Fl
     faces, triangles = np.asarray(mesh.faces), np.asarray(mesh.triangles)
     patches = connected(edges_of(faces).shared_by_two()[0], len(faces))
     met = patches[np.concatenate((pairs, pairs[:, ::-1]))]
-    normals, has_area = trimesh.triangles.normals(triangles)
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    doubled_area = np.linalg.norm(across, axis=1)
     for patch, other in np.unique(met[met[:, 0] != met[:, 1]], axis=0):
-        asked = np.flatnonzero((patches == patch) & has_area)
+        asked = np.flatnonzero((patches == patch) & (doubled_area > 0.0))
         asked = asked[:: len(asked) // _ASKED_TRIANGLES + 1]
         middles = triangles[asked].mean(axis=1)
-        lift = 10.0 * depth * normals[np.searchsorted(np.flatnonzero(has_area), asked)]
+        lift = 10.0 * depth * across[asked] / doubled_area[asked, np.newaxis]
         turns = np.abs(solid_angles(triangles[patches == other], np.concatenate((middles + lift, middles - lift))))
         sides = turns.reshape(2, -1) / (4.0 * np.pi)
         # A triangle that lies on the other body has one side inside and one outside.

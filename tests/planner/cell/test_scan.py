@@ -150,7 +150,7 @@ def test_a_fault_of_the_mesh_names_both_files(tmp_path: Path) -> None:
 
 def test_the_unit_of_a_mesh_is_a_key_of_the_workpiece(tmp_path: Path) -> None:
     inches = load_scan("cylinder").mesh.copy()
-    inches.apply_scale(1 / 25.4)
+    inches.vertices /= 25.4
     inches.export(tmp_path / "part.stl")
     file = changed(tmp_path, "cylinder", "diameter_mm = 140\nheight_mm = 180", 'mesh = "part.stl"')
     with pytest.raises(WorkpieceError, match=r"or inches\? Then set unit in \[workpiece\]"):

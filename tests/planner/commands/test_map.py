@@ -88,7 +88,7 @@ time_step_s = 1
 
 
 def scan_of(mesh: trimesh.Trimesh, folder: Path) -> Path:
-    (folder / "part.stl").write_bytes(mesh.export(file_type="stl"))
+    mesh.export(folder / "part.stl")
     (folder / "scan.toml").write_text(SCAN_OF_A_MESH)
     return folder / "scan.toml"
 

@@ -121,7 +121,9 @@ def test_a_shared_face_that_each_body_splits_its_own_way_is_no_hole() -> None:
 def test_any_heap_of_blocks_has_the_volume_of_its_blocks(kept: set[tuple[int, int, int]], seed: int) -> None:
     """Blocks of a grid, tumbled and rounded to single precision as in STL: corners, edges and faces are shared."""
     turn = Rotation.random(random_state=seed).as_matrix()
-    vertices, faces = loose(*together(*(block(*(20.0 * np.array(cell)), side_mm=20.0) for cell in sorted(kept))))
+    vertices, faces = loose(
+        *together(*(block(20.0 * cell[0], 20.0 * cell[1], 20.0 * cell[2], 20.0) for cell in sorted(kept)))
+    )
     surface = closed_surface((vertices @ turn.T).astype(np.float32).astype(np.float64), faces)
     assert volume(surface) == pytest.approx(len(kept) * 20.0**3, rel=1e-4)
 

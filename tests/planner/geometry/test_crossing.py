@@ -9,7 +9,7 @@ from planner.geometry.crossing import first_crossing
 
 
 def box(x_mm: float = 0.0, y_mm: float = 0.0, z_mm: float = 0.0) -> trimesh.Trimesh:
-    mesh = trimesh.creation.box((100.0, 100.0, 100.0))
+    mesh: trimesh.Trimesh = trimesh.creation.box((100.0, 100.0, 100.0))
     mesh.apply_translation((x_mm, y_mm, z_mm))
     return mesh
 
@@ -38,7 +38,7 @@ def test_separate_bodies_do_not_cross_and_overlapping_ones_do(x_mm: float, y_mm:
 
 def test_the_place_lies_on_both_surfaces() -> None:
     turned = box(60.0, 10.0, 20.0)
-    turned.apply_transform(trimesh.transformations.rotation_matrix(0.7, (1.0, 2.0, 3.0)))
+    turned.vertices = turned.vertices @ Rotation.from_rotvec([0.2, 0.4, 0.6]).as_matrix()
     place = first_crossing(both(box(), turned))
     assert place is not None
     for body in (box(), turned):
@@ -54,8 +54,8 @@ def test_boxes_that_share_the_planes_of_their_sides_are_seen_to_cross() -> None:
 def test_a_body_may_lie_against_the_wall_of_its_cavity() -> None:
     cavity, body = box(), box()
     cavity.invert()
-    cavity.apply_scale(0.8)
-    body.apply_scale(0.3)
+    cavity.vertices *= 0.8
+    body.vertices *= 0.3
     body.apply_translation((25.0, 25.0, 0.0))
     assert first_crossing(both(both(box(), cavity), body)) is None
 

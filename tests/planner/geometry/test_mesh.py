@@ -10,7 +10,8 @@ from planner.geometry.mesh import load_mesh, radius_about_axis_mm
 
 
 def box(size_mm: float = 100.0) -> trimesh.Trimesh:
-    return trimesh.creation.box((size_mm, size_mm, size_mm))
+    mesh: trimesh.Trimesh = trimesh.creation.box((size_mm, size_mm, size_mm))
+    return mesh
 
 
 def without_a_triangle() -> trimesh.Trimesh:

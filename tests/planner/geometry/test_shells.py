@@ -19,7 +19,7 @@ SOLID, CAVITY = False, True
 
 
 def box(side_mm: float, *, inverted: bool = False, at: Sequence[float] = (0.0, 0.0, 0.0)) -> trimesh.Trimesh:
-    mesh = trimesh.creation.box((side_mm, side_mm, side_mm))
+    mesh: trimesh.Trimesh = trimesh.creation.box((side_mm, side_mm, side_mm))
     mesh.apply_translation(at)
     if inverted:
         mesh.invert()

@@ -1,5 +1,5 @@
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -43,8 +43,12 @@ def exact_distances(points: NDArray[np.float64], mesh: trimesh.Trimesh | None = 
 
 
 def walked(a: tuple[float, ...], b: tuple[float, ...], enough_mm: float = math.inf) -> float:
+    return between(field(), a, b, enough_mm)
+
+
+def between(field: SignedDistanceField, a: Sequence[float], b: Sequence[float], enough_mm: float) -> float:
     (ax, ay, az), (bx, by, bz) = a, b
-    return field_distance(*field(), ax, ay, az, bx, by, bz, enough_mm)
+    return field_distance(*field, ax, ay, az, bx, by, bz, enough_mm)
 
 
 def hollow_box() -> trimesh.Trimesh:
@@ -162,15 +166,18 @@ def test_a_free_segment_gets_at_least_what_was_asked_for_any_spacing(
     spacing_mm: float, enough_mm: float, a: tuple[float, ...], b: tuple[float, ...]
 ) -> None:
     far = SignedDistanceField(np.full((3, 3, 3), 1e4, np.float32), np.zeros(3), spacing_mm)
-    assert field_distance(*far, *a, *b, enough_mm) >= enough_mm
+    assert between(far, a, b, enough_mm) >= enough_mm
 
 
 def random_part(kind: str, sizes_mm: tuple[float, float, float]) -> trimesh.Trimesh:
+    mesh: trimesh.Trimesh
     if kind == "box":
-        return trimesh.creation.box(sizes_mm)
-    if kind == "cylinder":
-        return trimesh.creation.cylinder(radius=sizes_mm[0] / 2, height=sizes_mm[1], sections=12)
-    return trimesh.creation.icosphere(subdivisions=1, radius=sizes_mm[0] / 2)
+        mesh = trimesh.creation.box(sizes_mm)
+    elif kind == "cylinder":
+        mesh = trimesh.creation.cylinder(radius=sizes_mm[0] / 2, height=sizes_mm[1], sections=12)
+    else:
+        mesh = trimesh.creation.icosphere(subdivisions=1, radius=sizes_mm[0] / 2)
+    return mesh
 
 
 size = st.floats(10.0, 400.0)
@@ -202,7 +209,7 @@ def test_any_part_on_any_grid_blocks_no_segment_that_is_free_of_it(
     for axis in range(3):
         a, b = rng.uniform(mesh.bounds[0] - 50.0, mesh.bounds[1] + 50.0, (2, 3))
         a[axis] = b[axis] = mesh.bounds[1, axis] + off_mm
-        assert field_distance(*field, *a.tolist(), *b.tolist(), enough_mm) >= enough_mm
+        assert between(field, a.tolist(), b.tolist(), enough_mm) >= enough_mm
 
 
 def test_a_field_is_built_once_and_read_back_the_same(tmp_path: Path) -> None:
