@@ -121,6 +121,13 @@ class TomlTable:
             raise self.refuse(key, f"a list of {count} tables")
         return [TomlTable(self.file, item, f"{self._prefix}{key}[{i + 1}].") for i, item in enumerate(value)]
 
+    def one_or_more(self, key: str) -> list["TomlTable"]:
+        """Return the table `key`, or the tables of the list `key`; an absent one is an empty table."""
+        value = self._take(key, {})
+        if isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
+            return [TomlTable(self.file, item, f"{self._prefix}{key}[{i + 1}].") for i, item in enumerate(value)]
+        return [self.table(key)]
+
     def finish(self) -> None:
         """Refuse keys that nothing has read.
 

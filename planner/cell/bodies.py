@@ -1,6 +1,5 @@
-"""The bodies that move with the arm: its links and the probe as capsules, and the probe's beam."""
+"""The bodies that move with the arm: its links as capsules, the probe's housing as a box, and the probe's beam."""
 
-from math import hypot, sqrt
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,13 +23,13 @@ _ARM_PARTS = {
     "forearm": (3, 3),
     "wrist": (WRIST_LINK, FLANGE_FRAME),
 }
-"""Each part's link and frame."""
-_HOUSING_MARGIN = 1.1
-"""A capsule around a block must be thicker than its diagonal, or it covers the corners only by being endless."""
+"""Each part's link and frame; a file has one capsule or several for each."""
+_MOUNT_DEPTH = 0.75
+"""Where the mount meets the housing, in depths of the housing from the laser's exit."""
 
 
 class Part(NamedTuple):
-    """A part of the arm or the probe: a capsule that moves with one frame of the arm.
+    """A part of the arm or the probe's mount: a capsule that moves with one frame of the arm.
 
     Attributes:
         name: What reasons call it.
@@ -49,6 +48,22 @@ class Part(NamedTuple):
     radius_mm: float
 
 
+class Housing(NamedTuple):
+    """The probe's housing: a box that moves with the flange, the last in the chain of bodies.
+
+    Attributes:
+        name: What reasons call it.
+        link: Its place in the chain.
+        T_FH: `(4, 4)`, its middle and its axes in the flange's frame.
+        half_mm: `(3,)`, half its lengths along these axes.
+    """
+
+    name: str
+    link: int
+    T_FH: FloatArray
+    half_mm: FloatArray
+
+
 class Beam(NamedTuple):
     """The probe's beam: a capsule from the probe's origin along its z axis to `gap_mm` before the surface."""
 
@@ -60,7 +75,13 @@ class Bodies(NamedTuple):
     """All that moves with the arm."""
 
     parts: tuple[Part, ...]
+    housing: Housing
     beam: Beam
+
+
+def shipped_bodies() -> list[str]:
+    """Return the names of the arms whose bodies come with the planner."""
+    return sorted(file.stem for file in _SHIPPED.glob("*.toml"))
 
 
 def load_bodies(probe: Probe, T_FS: FloatArray, file: Path | str = "viper_s650") -> Bodies:
@@ -76,42 +97,31 @@ def load_bodies(probe: Probe, T_FS: FloatArray, file: Path | str = "viper_s650")
     """
     shipped = _SHIPPED / f"{file}.toml"
     top = TomlTable.load(shipped if shipped.is_file() else Path(file))
-    parts = [_read_part(top, name, link, frame) for name, (link, frame) in _ARM_PARTS.items()]
-    housing = _housing(probe, T_FS)
+    parts = [
+        _read_part(table, name, link, frame)
+        for name, (link, frame) in _ARM_PARTS.items()
+        for table in top.one_or_more(name)
+    ]
     mount = top.table("probe_mount")
-    rear = (housing[-1].start_mm + housing[-1].end_mm) / 2
+    rear = (T_FS @ (0.0, 0.0, -_MOUNT_DEPTH * probe.body_mm[2], 1.0))[:3]
     radius_mm = mount.number("radius_mm", above=0.0)
     parts.append(Part("probe mount", WRIST_LINK, FLANGE_FRAME, np.zeros(3), rear, radius_mm))
     beam_table = top.table("beam")
     beam = Beam(beam_table.number("radius_mm", above=0.0), beam_table.number("gap_mm", at_least=0.0))
     for table in (mount, beam_table, top):
         table.finish()
-    return Bodies((*parts, *housing), beam)
+    return Bodies(tuple(parts), _housing(probe, T_FS), beam)
 
 
-def _read_part(top: TomlTable, name: str, link: int, frame: int) -> Part:
-    table = top.table(name)
+def _read_part(table: TomlTable, name: str, link: int, frame: int) -> Part:
     start, end = (np.array(table.numbers(key, 3)) for key in ("start_mm", "end_mm"))
     radius_mm = table.number("radius_mm", above=0.0)
     table.finish()
     return Part(name.replace("_", " "), link, frame, start, end, radius_mm)
 
 
-def _housing(probe: Probe, T_FS: FloatArray) -> tuple[Part, Part]:
-    """Return two capsules, the front one and the rear one, that together cover the probe's housing."""
-    x, y, z = probe.body_mm
-    half_diagonal = hypot(x / 2, z / 4)
-    radius_mm = _HOUSING_MARGIN * half_diagonal
-    reach = max(y / 2 - sqrt(radius_mm**2 - half_diagonal**2), 0.0)
-    front, rear = (
-        Part(
-            "probe",
-            _PROBE_LINK,
-            FLANGE_FRAME,
-            T_FS[:3, :3] @ (0.0, -reach, -depth) + T_FS[:3, 3],
-            T_FS[:3, :3] @ (0.0, reach, -depth) + T_FS[:3, 3],
-            radius_mm,
-        )
-        for depth in (z / 4, 3 * z / 4)
-    )
-    return front, rear
+def _housing(probe: Probe, T_FS: FloatArray) -> Housing:
+    """Return the probe's housing, which ends at the laser's exit."""
+    T_SH = np.eye(4)
+    T_SH[2, 3] = -probe.body_mm[2] / 2
+    return Housing("probe", _PROBE_LINK, T_FS @ T_SH, np.array(probe.body_mm) / 2)

@@ -18,26 +18,29 @@ from planner.cell.collision_model import (
     FRAME,
     KIND,
     LOWER,
+    MIDDLE,
     RADIUS,
     SIZE,
     START,
+    THIRD,
     UPPER,
     CollisionModel,
     base_in_obstacles,
 )
-from planner.cell.obstacles import FIELD
+from planner.geometry.box_distance import FIELD, box_distance_bound
 from planner.geometry.capsule import segment_distance
 from planner.geometry.signed_distance_field import field_distance
-from planner.geometry.solid import solid_distance
+from planner.geometry.solid import BOX, solid_distance
 from planner.kernel import kernel
 from planner.kinematics.arm import Arm, link_frames
 
 ARM_FRAMES = 4
 """The frames from the base's on that bodies move with; none moves with the wrist's, and then comes the flange's."""
 
-# The columns of a placed body: its ends and its middle in the base, half its length; all in mm.
-_MIDDLE, _HALF_LENGTH = 6, 9
-PLACED = 10
+# The columns of a placed body: its ends and its middle in the base, half its length, all in mm. The housing has two
+# half axes in the place of its ends, half its diagonal in the place of half its length, and the third half axis.
+_MIDDLE, _HALF_LENGTH, _THIRD = 6, 9, 10
+PLACED = 13
 """Columns of the table of placed bodies."""
 
 
@@ -97,11 +100,15 @@ def place_bodies(
         beam_mm: The beam's length.
         first: The first frame.
         last: The last frame.
-        placed: Written: `(n_bodies, PLACED)`, x y z of the start, the end and the middle, and half the length.
+        placed: Written: `(n_bodies, PLACED)`, x y z of the start, the end and the middle, and half the length; of the
+            housing, see the columns.
     """
     for body in range(len(bodies)):
         f = int(bodies[body, FRAME])
         if not first <= f <= last:
+            continue
+        if body == len(bodies) - 2:
+            _place_housing(bodies, body, frames, placed)
             continue
         half2 = 0.0
         for row in range(3):
@@ -115,6 +122,26 @@ def place_bodies(
             placed[body, _MIDDLE + row] = 0.5 * (start + end) + origin
             half2 += 0.25 * (end - start) * (end - start)
         placed[body, _HALF_LENGTH] = sqrt(half2)
+
+
+@kernel
+def _place_housing(bodies: FloatArray, body: int, frames: FloatArray, placed: FloatArray) -> None:
+    f = int(bodies[body, FRAME])
+    for row in range(3):
+        r0, r1, r2 = frames[f, row, 0], frames[f, row, 1], frames[f, row, 2]
+        for at, column in ((0, START), (3, END), (_MIDDLE, MIDDLE)):
+            placed[body, at + row] = (
+                r0 * bodies[body, column] + r1 * bodies[body, column + 1] + r2 * bodies[body, column + 2]
+            )
+        placed[body, _MIDDLE + row] += frames[f, row, 3]
+    ux, uy, uz = placed[body, 0], placed[body, 1], placed[body, 2]
+    vx, vy, vz = placed[body, 3], placed[body, 4], placed[body, 5]
+    u2, v2, w = ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, bodies[body, THIRD]
+    scale = w / sqrt(u2 * v2)
+    placed[body, _THIRD] = scale * (uy * vz - uz * vy)
+    placed[body, _THIRD + 1] = scale * (uz * vx - ux * vz)
+    placed[body, _THIRD + 2] = scale * (ux * vy - uy * vx)
+    placed[body, _HALF_LENGTH] = sqrt(u2 + v2 + w * w)
 
 
 @kernel
@@ -151,23 +178,24 @@ def nearest_pair(
             radius += bodies[other, RADIUS]
             if _spheres_apart(placed, body, other, bound + radius):
                 continue
-            distance = _body_distance(placed, body, other)
+            if body == beam - 1:
+                distance = _housing_distance(placed, body, other, bound + radius)
+            else:
+                distance = _body_distance(placed, body, other)
         else:
             i = other - beam - 1
             x, y, z = _in_frame(obstacle_frames, angle, i, placed, body, _MIDDLE)
             if _sphere_outside(obstacles, i, x, y, z, placed[body, _HALF_LENGTH] + bound + radius):
                 continue
-            ax, ay, az = _in_frame(obstacle_frames, angle, i, placed, body, 0)
-            bx, by, bz = _in_frame(obstacle_frames, angle, i, placed, body, 3)
-            kind = int(obstacles[i, KIND])
-            if kind == FIELD:
-                distance = field_distance(
-                    field_values, field_origin, field_spacing, ax, ay, az, bx, by, bz, bound + radius
-                )
+            if body == beam - 1:
+                distance = _housing_from_obstacle(
+                    obstacles, field_values, field_origin, field_spacing,
+                    placed, body, obstacle_frames, angle, i, bound + radius,
+                )  # fmt: skip
             else:
-                distance = solid_distance(
-                    kind, obstacles[i, SIZE], obstacles[i, SIZE + 1], obstacles[i, SIZE + 2],
-                    ax, ay, az, bx, by, bz, bound + radius,
+                distance = _body_from_obstacle(
+                    obstacles, field_values, field_origin, field_spacing,
+                    placed, body, obstacle_frames, angle, i, bound + radius,
                 )  # fmt: skip
         # Not by the difference: it would take a distance that is only known to be enough for a smaller one.
         if distance < bound + radius:
@@ -201,6 +229,86 @@ def _body_distance(placed: FloatArray, a: int, b: int) -> float:
         placed[a, 0], placed[a, 1], placed[a, 2], placed[a, 3], placed[a, 4], placed[a, 5],
         placed[b, 0], placed[b, 1], placed[b, 2], placed[b, 3], placed[b, 4], placed[b, 5],
     )  # fmt: skip
+
+
+@kernel
+def _body_from_obstacle(
+    obstacles: FloatArray, field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
+    placed: FloatArray, body: int, frames: FloatArray, angle: int, i: int, enough_mm: float,
+) -> float:  # fmt: skip
+    ax, ay, az = _in_frame(frames, angle, i, placed, body, 0)
+    bx, by, bz = _in_frame(frames, angle, i, placed, body, 3)
+    kind = int(obstacles[i, KIND])
+    if kind == FIELD:
+        return field_distance(field_values, field_origin, field_spacing, ax, ay, az, bx, by, bz, enough_mm)
+    return solid_distance(
+        kind, obstacles[i, SIZE], obstacles[i, SIZE + 1], obstacles[i, SIZE + 2],
+        ax, ay, az, bx, by, bz, enough_mm,
+    )  # fmt: skip
+
+
+@kernel
+def _housing_from_obstacle(
+    obstacles: FloatArray, field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
+    placed: FloatArray, housing: int, frames: FloatArray, angle: int, i: int, enough_mm: float,
+) -> float:  # fmt: skip
+    x, y, z = _in_frame(frames, angle, i, placed, housing, _MIDDLE)
+    ux, uy, uz = _turned(frames, angle, i, placed, housing, 0)
+    vx, vy, vz = _turned(frames, angle, i, placed, housing, 3)
+    wx, wy, wz = _turned(frames, angle, i, placed, housing, _THIRD)
+    return box_distance_bound(
+        int(obstacles[i, KIND]), obstacles[i, SIZE], obstacles[i, SIZE + 1], obstacles[i, SIZE + 2],
+        field_values, field_origin, field_spacing, x, y, z, ux, uy, uz, vx, vy, vz, wx, wy, wz, enough_mm,
+    )  # fmt: skip
+
+
+@kernel
+def _housing_distance(placed: FloatArray, housing: int, body: int, enough_mm: float) -> float:
+    """Return the distance of the housing from the segment of another body, as `solid_distance` does."""
+    ax, ay, az = _in_housing(placed, housing, body, 0)
+    bx, by, bz = _in_housing(placed, housing, body, 3)
+    return solid_distance(
+        BOX, _length(placed, housing, 0), _length(placed, housing, 3), _length(placed, housing, _THIRD),
+        ax, ay, az, bx, by, bz, enough_mm,
+    )  # fmt: skip
+
+
+@kernel
+def _length(placed: FloatArray, body: int, at: int) -> float:
+    x, y, z = placed[body, at], placed[body, at + 1], placed[body, at + 2]
+    return sqrt(x * x + y * y + z * z)
+
+
+@kernel
+def _in_housing(placed: FloatArray, housing: int, body: int, at: int) -> tuple[float, float, float]:
+    """Return a placed body's point, from column `at` on, along the housing's axes from its middle."""
+    x = placed[body, at] - placed[housing, _MIDDLE]
+    y = placed[body, at + 1] - placed[housing, _MIDDLE + 1]
+    z = placed[body, at + 2] - placed[housing, _MIDDLE + 2]
+    return (
+        _along(placed, housing, 0, x, y, z),
+        _along(placed, housing, 3, x, y, z),
+        _along(placed, housing, _THIRD, x, y, z),
+    )
+
+
+@kernel
+def _along(placed: FloatArray, housing: int, at: int, x: float, y: float, z: float) -> float:
+    along = x * placed[housing, at] + y * placed[housing, at + 1] + z * placed[housing, at + 2]
+    return along / _length(placed, housing, at)
+
+
+@kernel
+def _turned(
+    frames: FloatArray, angle: int, i: int, placed: FloatArray, body: int, at: int
+) -> tuple[float, float, float]:
+    """Return a placed body's vector, from column `at` on, as obstacle `i` sees it."""
+    x, y, z = placed[body, at], placed[body, at + 1], placed[body, at + 2]
+    return (
+        frames[angle, i, 0, 0] * x + frames[angle, i, 0, 1] * y + frames[angle, i, 0, 2] * z,
+        frames[angle, i, 1, 0] * x + frames[angle, i, 1, 1] * y + frames[angle, i, 1, 2] * z,
+        frames[angle, i, 2, 0] * x + frames[angle, i, 2, 1] * y + frames[angle, i, 2, 2] * z,
+    )
 
 
 @kernel

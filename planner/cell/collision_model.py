@@ -15,8 +15,9 @@ from planner.cell.obstacles import Obstacle, bounding_box
 from planner.geometry.signed_distance_field import NO_FIELD, SignedDistanceField
 from planner.geometry.transforms import rotations_z
 
-# The columns of the bodies' table: the frame that a body moves with, its ends there in mm, its radius in mm.
-FRAME, START, END, RADIUS = 0, 1, 4, 7
+# The columns of the bodies' table: the frame that a body moves with, its ends there in mm, its radius in mm; of the
+# housing, the first two half axes in the place of the ends, then its middle, and the length of the third half axis.
+FRAME, START, END, RADIUS, MIDDLE, THIRD = 0, 1, 4, 7, 8, 11
 # Those of the obstacles' table: the kind, three sizes, the least and the greatest x y z of a box around it, in mm.
 KIND, SIZE, LOWER, UPPER = 0, 1, 4, 7
 
@@ -28,10 +29,10 @@ _BEAM = "beam"
 class CollisionModel(NamedTuple):
     """What can collide with what, in the plain arrays that compiled kernels take; lengths in mm.
 
-    A body is a part, or, as the last one, the beam. An obstacle is numbered after the bodies.
+    A body is a part, or, as the last two, the housing and the beam. An obstacle is numbered after the bodies.
 
     Attributes:
-        bodies: `(n_bodies, 8)`, one row each; the beam's ends are one mm apart.
+        bodies: `(n_bodies, 12)`, one row each; the beam's ends are one mm apart.
         obstacles: `(n_obstacles, 10)`, the kind, three sizes, and a box around it in its own frame.
         field: Of the one obstacle that is a mesh.
         pairs: `(n_pairs, 2)`, a body and another one or an obstacle. Those of the flange's bodies with the obstacles
@@ -83,15 +84,25 @@ def collision_model(
         T_BT=np.array(T_BT, dtype=np.float64),
         beam_gap_mm=bodies.beam.gap_mm,
     )
-    names = [*(part.name for part in bodies.parts), _BEAM, *(obstacle.name for obstacle in obstacles)]
+    names = [
+        *(part.name for part in bodies.parts),
+        bodies.housing.name,
+        _BEAM,
+        *(obstacle.name for obstacle in obstacles),
+    ]
     return model, tuple(f"{names[first]} and {names[second]}" for first, second in pairs)
 
 
 def _body_table(bodies: Bodies, T_FS: FloatArray) -> FloatArray:
-    """Return the parts in their frames, a row each, and the beam, one mm long, in the flange's."""
+    """Return the parts in their frames, a row each, the housing, and the beam, one mm long, in the flange's."""
     start, axis = T_FS[:3, 3], T_FS[:3, 2]
-    parts = [[part.frame, *part.start_mm, *part.end_mm, part.radius_mm] for part in bodies.parts]
-    return np.array([*parts, [FLANGE_FRAME, *start, *(start + axis), bodies.beam.radius_mm]])
+    table = np.zeros((len(bodies.parts) + 2, THIRD + 1))
+    table[:-2, : RADIUS + 1] = [[part.frame, *part.start_mm, *part.end_mm, part.radius_mm] for part in bodies.parts]
+    T_FH, half_mm = bodies.housing.T_FH, bodies.housing.half_mm
+    half_axes = T_FH[:3, :3] * half_mm
+    table[-2] = FLANGE_FRAME, *half_axes[:, 0], *half_axes[:, 1], 0.0, *T_FH[:3, 3], half_mm[2]
+    table[-1, : RADIUS + 1] = FLANGE_FRAME, *start, *(start + axis), bodies.beam.radius_mm
+    return table
 
 
 def _obstacle_table(obstacles: Sequence[Obstacle]) -> FloatArray:
@@ -101,7 +112,7 @@ def _obstacle_table(obstacles: Sequence[Obstacle]) -> FloatArray:
 
 def _pairs(bodies: Bodies, n_obstacles: int) -> tuple[IndexArray, int]:
     """Return the pairs that can meet, those common to all arm configurations first, and how many those are."""
-    links = [part.link for part in bodies.parts]
+    links = [*(part.link for part in bodies.parts), bodies.housing.link]
     beam = len(links)
     obstacles = range(beam + 1, beam + 1 + n_obstacles)
     tool = [body for body, link in enumerate(links) if link >= WRIST_LINK]

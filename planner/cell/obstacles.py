@@ -11,12 +11,10 @@ from planner.arrays import FloatArray
 from planner.cell.cell import Cell
 from planner.cell.scan import Scan
 from planner.cell.workpiece import Cylinder, Sphere
+from planner.geometry.box_distance import FIELD
 from planner.geometry.signed_distance_field import SignedDistanceField, cached_field
 from planner.geometry.solid import BOX, CAPSULE, CYLINDER
 from planner.progress import Progress
-
-FIELD = 3
-"""The kind of obstacle whose shape is a signed distance field; the other kinds are those of `geometry.solid`."""
 
 _FLOOR_SIDE_MM = 10_000.0
 _FLOOR_THICKNESS_MM = 100.0

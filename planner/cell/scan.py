@@ -13,7 +13,7 @@ import numpy as np
 import trimesh
 
 from planner.arrays import FloatArray
-from planner.cell.bodies import Bodies, load_bodies
+from planner.cell.bodies import Bodies, load_bodies, shipped_bodies
 from planner.cell.cell import Cell, Probe, Table, placement
 from planner.cell.patterns import PATTERNS, StripLayout
 from planner.cell.scan_path import ScanPath, at_scan_speed, load_scan_path
@@ -27,6 +27,7 @@ from planner.table.motion import Limits
 from planner.toml_table import TomlTable
 
 _SHIPPED = Path(__file__).parents[1] / "scans"
+_DEFAULT_ARM = "viper_s650"
 # A workpiece may touch the table, and a mesh's base need not be ground flat.
 _BASE_TOLERANCE_MM = 0.5
 
@@ -116,8 +117,9 @@ def _named(file: Path) -> Iterator[None]:
 
 
 def _read_cell(section: TomlTable, folder: Path) -> tuple[Cell, Bodies]:
-    arm = Arm.load(_beside(folder, section.text("arm", "viper_s650")))
-    bodies_file = _beside(folder, section.text("bodies", "viper_s650"))
+    arm_file = _beside(folder, section.text("arm", _DEFAULT_ARM))
+    arm = Arm.load(arm_file)
+    bodies_file = _bodies_file(section, folder, arm_file)
     placed = {
         name: _placement(section, key)
         for name, key in (("T_BT", "table_in_base"), ("T_TW", "workpiece_on_table"), ("T_FS", "probe_on_flange"))
@@ -127,6 +129,19 @@ def _read_cell(section: TomlTable, folder: Path) -> tuple[Cell, Bodies]:
     section.finish()
     cell = Cell(arm=arm, table=table, probe=probe, **placed)
     return cell, load_bodies(probe, cell.T_FS, bodies_file)
+
+
+def _bodies_file(section: TomlTable, folder: Path, arm_file: Path | str) -> Path | str:
+    """Return the file of the arm's bodies: a shipped arm brings its own, of any other arm nothing is known."""
+    if "bodies" in section:
+        return _beside(folder, section.text("bodies"))
+    if arm_file in shipped_bodies():
+        return arm_file
+    raise section.refuse(
+        "bodies",
+        f"the file of the collision bodies of {arm_file}, since those of another arm would be wrong: copy one of"
+        f" {', '.join(shipped_bodies())} from planner/bodies/, and fit its capsules to the arm",
+    )
 
 
 def _beside(folder: Path, name: str) -> Path | str:

@@ -26,6 +26,8 @@ from planner.whole_file import whole_file
 _MOST_POINTS = 4_000_000
 _RULES = b"signs by the nesting of shells"
 """Part of a stored field's name, so that fields built by other rules are not read back."""
+LOOK_UP_ERROR = 0.5 * sqrt(3.0)
+"""What a look-up can be off, in grid spacings: half a cell's diagonal."""
 _STEP = 0.25
 """Shortest stride of the walk along a segment, in grid spacings."""
 
@@ -185,7 +187,7 @@ def field_distance(
     length = sqrt(ux * ux + uy * uy + uz * uz)
     half, shortest = 0.5 * length, _STEP * spacing
     # Half a cell's diagonal from the look-up, half a shortest stride from the walk.
-    error = (0.5 * sqrt(3.0) + 0.5 * _STEP) * spacing
+    error = (LOOK_UP_ERROR + 0.5 * _STEP) * spacing
     middle = look_up(values, origin, spacing, ax + 0.5 * ux, ay + 0.5 * uy, az + 0.5 * uz)
     free = enough_mm + error
     least = min(free, middle)

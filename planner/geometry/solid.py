@@ -61,12 +61,26 @@ def cylinder_distance(
 
 
 @kernel
+def capsule_distance(
+    x: float, y: float, z: float, radius: float, half_length: float
+) -> tuple[float, float, float, float]:
+    """Return the signed distance in mm of a point from a capsule, and that distance's gradient."""
+    z -= min(max(z, -half_length), half_length)
+    distance = sqrt(x * x + y * y + z * z)
+    if distance == 0.0:
+        return -radius, 1.0, 0.0, 0.0
+    return distance - radius, x / distance, y / distance, z / distance
+
+
+@kernel
 def point_distance(
     kind: int, size_0: float, size_1: float, size_2: float, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
-    """Return the signed distance in mm of a point from a box or a cylinder, and that distance's gradient."""
+    """Return the signed distance in mm of a point from a solid, and that distance's gradient."""
     if kind == BOX:
         return box_distance(x, y, z, size_0, size_1, size_2)
+    if kind == CAPSULE:
+        return capsule_distance(x, y, z, size_0, size_1)
     return cylinder_distance(x, y, z, size_0, size_1)
 
 

@@ -1,6 +1,9 @@
 """A six-axis arm with a spherical wrist: its Denavit-Hartenberg table and its forward kinematics.
 
-Standard convention (Spong et al., 2005): frame i follows frame i - 1 by Rz(joint i) Tz(d) Tx(a) Rx(alpha).
+Standard convention (Spong et al., 2005): frame i follows frame i - 1 by Rz(theta i) Tz(d) Tx(a) Rx(alpha).
+
+Makers count joint angles from another zero, and some joints the other way round: theta = sign x angle + offset. All
+computing is done in theta, in radians. The robot's own angles, in degrees, are what files hold.
 """
 
 import math
@@ -31,13 +34,15 @@ class Arm:
         d_mm: Offsets along the joint axes.
         a_mm: Lengths of the common normals.
         alpha_deg: Twists about the common normals.
-        lower_deg: Lower joint limits.
-        upper_deg: Upper joint limits.
-        max_speed_deg_s: Greatest joint speeds.
+        lower_deg: Lower joint limits, in the robot's own angles.
+        upper_deg: Upper joint limits, in the robot's own angles.
+        max_speed_deg_s: Maximum joint speeds.
+        sign: 1, or -1 for a joint that the robot counts the other way round than the table.
+        offset_deg: The table's angle where the robot's own is 0.
 
     Raises:
         ArmTableError: The arm is not ortho-parallel with a spherical wrist, which the closed-form inverse kinematics
-            need, or its limits contradict each other.
+            need, or its limits contradict each other, or a sign is neither 1 nor -1.
     """
 
     name: str
@@ -47,9 +52,12 @@ class Arm:
     lower_deg: tuple[float, ...]
     upper_deg: tuple[float, ...]
     max_speed_deg_s: tuple[float, ...]
+    sign: tuple[float, ...] = (1.0,) * 6
+    offset_deg: tuple[float, ...] = (0.0,) * 6
 
     def __post_init__(self) -> None:
-        columns = (self.d_mm, self.a_mm, self.alpha_deg, self.lower_deg, self.upper_deg, self.max_speed_deg_s)
+        limits = (self.lower_deg, self.upper_deg, self.max_speed_deg_s)
+        columns = (self.d_mm, self.a_mm, self.alpha_deg, *limits, self.sign, self.offset_deg)
         if any(len(column) != 6 or not all(map(math.isfinite, column)) for column in columns):
             raise ArmTableError(f"{self.name}: each column of the arm's table must hold 6 finite numbers")
         self._check_shape()
@@ -61,6 +69,9 @@ class Arm:
                 )
             if not speed > 0:
                 raise ArmTableError(f"{self.name}: speed of joint {joint} is {speed:g} deg/s; it must be above 0")
+        for joint, sign in enumerate(self.sign, 1):
+            if abs(sign) != 1.0:
+                raise ArmTableError(f"{self.name}: sign of joint {joint} is {sign:g}; it must be 1 or -1")
 
     def _check_shape(self) -> None:
         mirrored = tuple(-alpha for alpha in _ORTHO_PARALLEL_ALPHA_DEG)
@@ -93,18 +104,33 @@ class Arm:
         d_mm, a_mm, alpha_deg, max_speed_deg_s = (
             tuple(row.number(key) for row in rows) for key in ("d_mm", "a_mm", "alpha_deg", "max_speed_deg_s")
         )
+        sign, offset_deg = (
+            tuple(row.number(key, value) for row in rows) for key, value in (("sign", 1), ("offset_deg", 0))
+        )
         for table in (top, *rows):
             table.finish()
         lower_deg, upper_deg = zip(*limits, strict=True)
-        return cls(name, d_mm, a_mm, alpha_deg, lower_deg, upper_deg, max_speed_deg_s)
+        return cls(name, d_mm, a_mm, alpha_deg, lower_deg, upper_deg, max_speed_deg_s, sign, offset_deg)
+
+    def joints(self, robot_deg: FloatArray) -> FloatArray:
+        """Return the table's joints `(n, 6)` in radians for the robot's own angles `(n, 6)` in degrees."""
+        return np.asarray(np.radians(robot_deg * np.array(self.sign) + self.offset_deg))
+
+    def robot_deg(self, joints: FloatArray) -> FloatArray:
+        """Return the robot's own angles `(n, 6)` in degrees for the table's joints `(n, 6)` in radians."""
+        return np.asarray((np.degrees(joints) - self.offset_deg) * np.array(self.sign))
+
+    @property
+    def limits(self) -> FloatArray:
+        """The lower and the upper joint limits `(2, 6)`, as joints of the table, in radians."""
+        return np.asarray(np.sort(self.joints(np.array([self.lower_deg, self.upper_deg])), axis=0))
 
     @property
     def table(self) -> FloatArray:
         """The `(6, 6)` table as the kernels take it: one row per joint, the columns named D_MM to UPPER_RAD."""
         # The twists are multiples of 90 degrees, whose sines and cosines are whole numbers.
         alpha = np.radians(self.alpha_deg)
-        limits = np.radians(self.lower_deg), np.radians(self.upper_deg)
-        return np.column_stack((self.d_mm, self.a_mm, np.rint(np.cos(alpha)), np.rint(np.sin(alpha)), *limits))
+        return np.column_stack((self.d_mm, self.a_mm, np.rint(np.cos(alpha)), np.rint(np.sin(alpha)), *self.limits))
 
     def flange_poses(self, joints: FloatArray) -> FloatArray:
         """Return T_BF `(n, 4, 4)`, flange in base, in mm, for joints `(n, 6)` in radians."""

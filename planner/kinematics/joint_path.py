@@ -39,7 +39,7 @@ def joint_path(arm: Arm, configuration: Configuration, T_BF: FloatArray, step_s:
     if len(unsolved):
         return JointPath(joints, Reason(int(reason[unsolved[0]])), int(unsolved[0]))
 
-    lower, upper = np.radians(arm.lower_deg), np.radians(arm.upper_deg)
+    lower, upper = arm.limits
     joints = np.unwrap(joints, axis=0)
     off_middle = 0.5 * (joints.min(axis=0) + joints.max(axis=0)) - 0.5 * (lower + upper)
     joints -= _TURN * np.rint(off_middle / _TURN)

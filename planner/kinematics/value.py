@@ -42,7 +42,7 @@ class RatedPoses(NamedTuple):
     """Poses without a fault, one row each, as a user's factor gets them.
 
     Attributes:
-        joints: `(n, 6)`, in radians.
+        joints: `(n, 6)`, the robot's own angles, in radians.
         clearance_mm: `(n,)`; where nothing is nearer than the comfortable clearance, that.
         locations: `(n,)`, index of the scan location.
         table_angles_deg: `(n,)`.
@@ -158,7 +158,7 @@ def joint_ranges(arm: Arm) -> FloatArray:
     negative half of joint 5's range and NOFLIP the positive one, and ABOVE and BELOW meet at the stretched arm.
     """
     ranges = np.empty((len(Configuration), 6, 2))
-    ranges[:] = np.radians(np.stack([arm.lower_deg, arm.upper_deg], axis=1))
+    ranges[:] = arm.limits.T
     # Mirrored twists turn joint 3 the other way round (see `planner.kinematics.inverse_kinematics`).
     sense = -math.copysign(1.0, arm.alpha_deg[0])
     stretched = sense * math.atan2(arm.d_mm[3], arm.a_mm[2])

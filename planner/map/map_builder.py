@@ -19,7 +19,7 @@ from planner.cell.bodies import FLANGE_FRAME
 from planner.cell.clearance import ARM_FRAMES, PLACED, nearest_pair, place_bodies
 from planner.cell.collision_model import base_in_obstacles
 from planner.kernel import kernel
-from planner.kinematics.arm import link_frames
+from planner.kinematics.arm import Arm, link_frames
 from planner.kinematics.configuration import Configuration
 from planner.kinematics.inverse_kinematics import inverse
 from planner.kinematics.value import (
@@ -90,7 +90,7 @@ def build_maps(
         last = min(first + block, n_locations)
         window = values[:, first:last], reasons[:, first:last]
         if user_factors:
-            _rate_with_user_factors(cells, user_factors, first, *window)
+            _rate_with_user_factors(cells, problem.cell.arm, user_factors, first, *window)
         else:
             _rate_columns(*cells, first, *window, *_NO_POSES)
         if progress is not None:
@@ -158,13 +158,13 @@ def _digest(cells: _Cells, user_factor_names: Sequence[str]) -> str:
 
 
 def _rate_with_user_factors(
-    cells: _Cells, factors: Sequence[UserFactor], first: int, values: FloatArray, reasons: CodeArray
+    cells: _Cells, arm: Arm, factors: Sequence[UserFactor], first: int, values: FloatArray, reasons: CodeArray
 ) -> None:
     joints, clearance_mm = np.empty((*values.shape, 6)), np.empty(values.shape)
     _rate_columns(*cells, first, values, reasons, joints, clearance_mm)
     alive = np.nonzero(values)
     rated = RatedPoses(
-        joints[alive],
+        np.radians(arm.robot_deg(joints[alive])),
         clearance_mm[alive],
         alive[1] + first,
         alive[2] * (360.0 / values.shape[2]),

@@ -23,7 +23,7 @@ class PlannedArm(NamedTuple):
     Attributes:
         cell: the arm and its placements.
         T_WS: (n + 1, 4, 4) the scan locations.
-        joints_deg: (n + 1, 6) the joints at the scan locations, on the turns that they are to have.
+        joints_deg: (n + 1, 6) the robot's own joint angles at the scan locations, on the turns that they are to have.
     """
 
     cell: Cell
@@ -54,7 +54,7 @@ def arm_fault(planned: PlannedArm, plan: Plan) -> str | None:
     fault = first_joint_fault(cell.arm, joints_deg, plan.step_s, [pause.step for pause in plan.pauses])
     if fault is not None:
         return str(fault)
-    joints = np.radians(joints_deg)
+    joints = cell.arm.joints(joints_deg)
     goals = cell.table_factors(plan.angles_deg) @ cell.location_factors(T_WS)
     off = np.abs(cell.arm.flange_poses(joints) - goals)
     far = np.flatnonzero(

@@ -48,7 +48,7 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -
             "accelerations_deg_s2": plan.accelerations_deg_s2.tolist(),
             "pauses": [pause._asdict() for pause in plan.pauses],
         },
-        "joints_deg": _rounded(np.degrees(joints.joints)),
+        "joints_deg": _rounded(cell.arm.robot_deg(joints.joints)),
         "arm": asdict(cell.arm),
         "arm_fault": None if joints.step is None else f"{joints.reason.name} at location {joints.step}",
         "locations": _rounded(scan.path.T_WS),

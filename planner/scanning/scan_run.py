@@ -153,7 +153,7 @@ def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: Progre
     plan = comparison.outcomes[comparison.best]
     assert isinstance(plan, Plan)
     joints = arm_motion(scan, Configuration.parse(comparison.best), plan)
-    joints_deg = np.degrees(joints.joints)
+    joints_deg = scan.cell.arm.robot_deg(joints.joints)
     fault = arm_fault(PlannedArm(scan.cell, scan.path.T_WS, joints_deg), plan)
     if fault is not None or joints.step is not None:
         raise ScanError(
@@ -224,9 +224,8 @@ def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: Progre
     planned = plan_scan(scan, options.configuration, options.angle_count, progress)
     out.mkdir(parents=True, exist_ok=True)
     run = run_on_port(planned, options, progress)
-    chain = Chain(
-        run, Calibration.of(scan.cell), knowledge.calibration, lambda deg: scan.cell.arm.flange_poses(np.radians(deg))
-    )
+    arm = scan.cell.arm
+    chain = Chain(run, Calibration.of(scan.cell), knowledge.calibration, lambda deg: arm.flange_poses(arm.joints(deg)))
     work = _Measuring(scan.mesh, probe, chain, options)
     with ExitStack() as files:
         ply = files.enter_context(PlyWriter(out / "cloud.ply", f"seventh-axis scan {scan.name}, seed {options.seed}"))

@@ -38,7 +38,7 @@ def bench(stream: TextIO) -> None:
 def _bench_kinematics(stream: TextIO) -> None:
     arm = Arm.load()
     rng = np.random.default_rng(0)
-    joints = rng.uniform(np.radians(arm.lower_deg), np.radians(arm.upper_deg), (POSES, 6))
+    joints = rng.uniform(arm.limits[0], arm.limits[1], (POSES, 6))
     poses = arm.flange_poses(joints)
     robot = _opw(arm)
     rigid = robot.batch_forward(joints)

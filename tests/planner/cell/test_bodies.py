@@ -3,40 +3,46 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from planner.cell.bodies import load_bodies
+from planner.cell.bodies import load_bodies, shipped_bodies
 from planner.cell.cell import Probe, placement
 from planner.errors import ScanFileError
-from planner.geometry.capsule import segment_distance
 
 SHIPPED = Path("planner/bodies/viper_s650.toml")
 T_FS = placement(10.0, -20.0, 100.0, 30.0, 40.0, 50.0)
-side = st.floats(20.0, 200.0)
 
 
-@settings(deadline=None, max_examples=50)
-@given(x=side, y=side, z=side)
-def test_the_probes_capsules_cover_its_housing(x: float, y: float, z: float) -> None:
-    bodies = load_bodies(Probe(body_mm=(x, y, z)), T_FS)
-    housing = [part for part in bodies.parts if part.name == "probe"]
-    corners = itertools.product((-x / 2, x / 2), (-y / 2, 0.0, y / 2), (-z, -z / 2, 0.0))
-    for corner in corners:
-        at_flange = T_FS[:3, :3] @ corner + T_FS[:3, 3]
-        point = (float(at_flange[0]), float(at_flange[1]), float(at_flange[2]))
-        assert any(
-            segment_distance(*point, *point, *map(float, (*part.start_mm, *part.end_mm))) <= part.radius_mm + 1e-9
-            for part in housing
-        )
+def test_the_probes_housing_ends_at_its_exit_plane() -> None:
+    housing = load_bodies(Probe(body_mm=(20.0, 40.0, 60.0)), T_FS).housing
+    corners = np.array(list(itertools.product((-1, 1), repeat=3))) * housing.half_mm
+    in_S = (np.linalg.inv(T_FS) @ housing.T_FH)[:3]
+    np.testing.assert_allclose((corners @ in_S[:, :3].T + in_S[:, 3]).min(axis=0), [-10.0, -20.0, -60.0], atol=1e-9)
+    np.testing.assert_allclose((corners @ in_S[:, :3].T + in_S[:, 3]).max(axis=0), [10.0, 20.0, 0.0], atol=1e-9)
 
 
-def test_the_shipped_parts_follow_the_arm_from_base_to_probe() -> None:
-    bodies = load_bodies(Probe(), T_FS)
-    links = [part.link for part in bodies.parts]
+@pytest.mark.parametrize("name", shipped_bodies())
+def test_shipped_parts_follow_the_arm_from_base_to_probe(name: str) -> None:
+    bodies = load_bodies(Probe(), T_FS, name)
+    links = [*(part.link for part in bodies.parts), bodies.housing.link]
     assert links == sorted(links)
-    assert [part.name for part in bodies.parts][:2] == ["base", "shoulder"]
-    assert np.allclose(bodies.parts[-3].start_mm, 0.0)  # the mount begins at the flange
+    names = list(dict.fromkeys(part.name for part in bodies.parts))
+    assert names == ["base", "shoulder", "upper arm", "elbow", "forearm", "wrist", "probe mount"]
+    assert np.allclose(bodies.parts[-1].start_mm, 0.0)  # the mount begins at the flange
+
+
+def test_every_shipped_arm_has_its_bodies() -> None:
+    assert shipped_bodies() == sorted(file.stem for file in Path("planner/arms").glob("*.toml"))
+
+
+def test_a_part_may_have_several_capsules(tmp_path: Path) -> None:
+    file = tmp_path / "bodies.toml"
+    row = "[[elbow]]\nstart_mm = [{}, 0, 0]\nend_mm = [0, 0, 0]\nradius_mm = 30\n"
+    file.write_text(SHIPPED.read_text().replace("[elbow]", row.format(40) + row.format(50) + "[[elbow]]"))
+    bodies = load_bodies(Probe(), T_FS, file)
+    assert [part.start_mm[0] for part in bodies.parts if part.name == "elbow"] == [40.0, 50.0, 90.0]
+    file.write_text(file.read_text().replace("[50, 0, 0]", "[50, 0]"))
+    with pytest.raises(ScanFileError, match=r"elbow\[2\].start_mm is \[50, 0\]; it must be a list of 3"):
+        load_bodies(Probe(), T_FS, file)
 
 
 @pytest.mark.parametrize(

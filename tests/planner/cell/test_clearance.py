@@ -6,7 +6,7 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
-from planner.cell.bodies import Bodies, load_bodies
+from planner.cell.bodies import FLANGE_FRAME, Bodies, load_bodies
 from planner.cell.cell import Cell, placement
 from planner.cell.clearance import Clearances, clearances
 from planner.cell.collision_model import CollisionModel, collision_model
@@ -57,7 +57,7 @@ def coal_transform(pose: Poses) -> object:
 def coal_scene(
     joints: Poses, angle_deg: float, obstacles: tuple[Obstacle, ...]
 ) -> dict[str, list[tuple[object, object]]]:
-    """Return the shapes and where they are, by name; the front and the rear of the probe share theirs."""
+    """Return the shapes and where they are, by name."""
     frames = CELL.arm.link_frames(joints[None])[0]
     scene: dict[str, list[tuple[object, object]]] = {}
     for part in BODIES.parts:
@@ -68,6 +68,8 @@ def coal_scene(
         local[:3, :3], local[:3, 3] = turn, (part.start_mm + part.end_mm) / 2
         shape = coal.Capsule(part.radius_mm, length)
         scene.setdefault(part.name, []).append((shape, coal_transform(frames[part.frame] @ local)))
+    housing = BODIES.housing
+    scene[housing.name] = [(coal.Box(*(2.0 * housing.half_mm)), coal_transform(frames[FLANGE_FRAME] @ housing.T_FH))]
     table = CELL.T_BT @ rotations_z(np.array([angle_deg]))[0]
     for obstacle in obstacles:
         pose = table @ obstacle.pose if obstacle.turning else obstacle.pose
@@ -105,8 +107,8 @@ def test_clearance_and_nearest_pair_are_those_that_coal_finds() -> None:
         nearest = min(found.values())
         if nearest > 0.01 and ours.clearance_mm[i] > 0.0:
             free += 1
-            assert ours.clearance_mm[i] == pytest.approx(nearest, abs=1e-3)
-            assert found[names[ours.pair[i]]] == pytest.approx(nearest, abs=1e-3)
+            assert ours.clearance_mm[i] == pytest.approx(nearest, abs=2e-3)
+            assert found[names[ours.pair[i]]] == pytest.approx(nearest, abs=2e-3)
         else:
             assert ours.clearance_mm[i] <= 0.011 or names[ours.pair[i]].startswith("beam")
     assert free > 30
@@ -119,7 +121,7 @@ def test_the_beam_counts_only_where_something_blocks_it() -> None:
     def beam_past(offset_mm: float) -> Clearances:
         pose = laser @ at(0.0, offset_mm, 100.0)
         model, _ = model_with(sphere("ball", 10.0, pose, turning=False))
-        beam_only = np.flatnonzero(model.pairs[:, 0] == len(BODIES.parts))
+        beam_only = np.flatnonzero(model.pairs[:, 0] == len(BODIES.parts) + 1)
         return rate(model._replace(pairs=model.pairs[beam_only]), joints)
 
     assert beam_past(13.0).pair[0] == -1
