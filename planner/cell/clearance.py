@@ -295,7 +295,7 @@ def _in_housing(placed: FloatArray, housing: int, body: int, at: int) -> tuple[f
 @kernel
 def _along(placed: FloatArray, housing: int, at: int, x: float, y: float, z: float) -> float:
     along = x * placed[housing, at] + y * placed[housing, at + 1] + z * placed[housing, at + 2]
-    return along / _length(placed, housing, at)
+    return float(along / _length(placed, housing, at))
 
 
 @kernel

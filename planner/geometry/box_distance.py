@@ -57,8 +57,8 @@ def box_distance_bound(
 ) -> float:  # fmt: skip
     """Return a lower bound in mm of the least signed distance of a box from a shape.
 
-    It is at most a thousandth of a mm below that of a solid outside; that of a field may be `FIELD_TOLERANCE_MM` higher, and
-    what the field itself is off. A result at or above `enough_mm` is only known to be so.
+    Outside, it is at most a thousandth of a mm below that of a solid, and at most `FIELD_TOLERANCE_MM`, plus what the
+    field itself is off, below that of a field. A result at or above `enough_mm` is only known to be so.
 
     Args:
         kind: BOX, CYLINDER or CAPSULE of `planner.geometry.solid`, or FIELD.

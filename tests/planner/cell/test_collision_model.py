@@ -5,7 +5,8 @@ import trimesh
 from planner.cell.bodies import Bodies, load_bodies
 from planner.cell.cell import Cell, placement
 from planner.cell.collision_model import CollisionModel, collision_model
-from planner.cell.obstacles import FIELD, Obstacle, cell_obstacles
+from planner.cell.obstacles import Obstacle, cell_obstacles
+from planner.geometry.box_distance import FIELD
 from planner.geometry.signed_distance_field import build_field
 
 CELL = Cell(T_BT=placement(430.0, 0.0, 120.0, 0.0, 0.0, 0.0))

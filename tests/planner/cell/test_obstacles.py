@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from planner.cell.cell import Cell, placement
-from planner.cell.obstacles import FIELD, cell_obstacles, workpiece_obstacle
+from planner.cell.obstacles import cell_obstacles, workpiece_obstacle
 from planner.cell.scan import load_scan
+from planner.geometry.box_distance import FIELD
 from planner.geometry.signed_distance_field import look_up
 from planner.geometry.solid import CAPSULE, CYLINDER, cylinder_distance
 

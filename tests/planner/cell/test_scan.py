@@ -171,3 +171,21 @@ def test_what_is_mended_in_a_mesh_is_said(tmp_path: Path) -> None:
     load_scan(file, said.append)
     load_scan("cylinder", said.append)
     assert said == [f"{tmp_path / 'part.stl'}: turned {len(mesh.faces)} inside-out triangles"]
+
+
+def test_another_arm_without_bodies_is_refused_with_how_to_give_them(tmp_path: Path) -> None:
+    (tmp_path / "other.toml").write_text((SCANS.parent / "arms" / "viper_s650.toml").read_text())
+    file = changed(tmp_path, "sphere", '"viper_s650"', '"other.toml"')
+    with pytest.raises(
+        ScanFileError, match=r"cell.bodies is missing; it must be the file of the collision bodies"
+    ) as refusal:
+        load_scan(file)
+    assert "kuka_kr6_r700, viper_s650 from planner/bodies/" in str(refusal.value)
+    file.write_text(file.read_text().replace('"other.toml"', '"other.toml"\nbodies = "viper_s650"'))
+    assert load_scan(file).bodies.parts[0].radius_mm == 90.0
+
+
+def test_a_shipped_arm_brings_its_own_bodies(tmp_path: Path) -> None:
+    scan = load_scan(changed(tmp_path, "sphere", '"viper_s650"', '"kuka_kr6_r700"'))
+    assert scan.cell.arm.name == "KUKA KR 6 R700 sixx"
+    assert scan.bodies.parts[0].radius_mm == 128.0

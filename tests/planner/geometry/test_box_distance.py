@@ -26,8 +26,10 @@ def bound(
     half_mm: FloatArray = HALF_MM,
     field: SignedDistanceField = NO_FIELD,
 ) -> float:
-    axes = (turn * half_mm).T.ravel().tolist()
-    return float(box_distance_bound(kind, *SIZES.get(kind, (0, 0, 0)), *field, *place.tolist(), *axes, enough_mm))
+    (ux, uy, uz), (vx, vy, vz), (wx, wy, wz) = (turn * half_mm).T.tolist()
+    x, y, z = place.tolist()
+    a, b, c = SIZES.get(kind, (0.0, 0.0, 0.0))
+    return box_distance_bound(kind, a, b, c, *field, x, y, z, ux, uy, uz, vx, vy, vz, wx, wy, wz, enough_mm)
 
 
 def random_boxes(count: int, seed: int) -> list[tuple[FloatArray, FloatArray]]:

@@ -51,6 +51,7 @@ def _denavit_hartenberg(arm: Arm, j: int, theta: float) -> FloatArray:
         ({"lower_deg": (-170.0, 45.0, -29.0, -190.0, -120.0, -360.0)}, "joint 2 are 45..45 deg"),
         ({"max_speed_deg_s": (328.0, 300.0, 375.0, 0.0, 375.0, 600.0)}, "speed of joint 4 is 0"),
         ({"d_mm": (335.0, 0.0, 0.0, float("nan"), 0.0, 80.0)}, "finite"),
+        ({"sign": (1.0, 1.0, 0.5, 1.0, 1.0, 1.0)}, "sign of joint 3 is 0.5; it must be 1 or -1"),
     ],
 )
 def test_a_table_that_the_closed_form_does_not_cover_is_refused(
@@ -73,3 +74,28 @@ def test_another_arm_is_another_file(tmp_path: Path) -> None:
     longer = tmp_path / "arm.toml"
     longer.write_text(shipped.read_text().replace("d_mm = 80", "d_mm = 95"))
     assert Arm.load(longer).d_mm == (335.0, 0.0, 0.0, 295.0, 0.0, 95.0)
+
+
+def test_the_robots_own_angles_and_the_tables_are_turned_into_each_other() -> None:
+    kuka = Arm.load("kuka_kr6_r700")
+    robot_deg = np.array([[10.0, -20.0, 30.0, 40.0, 50.0, 60.0]])
+    np.testing.assert_allclose(np.degrees(kuka.joints(robot_deg)), [[-10.0, -20.0, 120.0, -40.0, 50.0, -60.0]])
+    np.testing.assert_allclose(kuka.robot_deg(kuka.joints(robot_deg)), robot_deg)
+
+
+def test_limits_of_a_joint_that_counts_the_other_way_round_change_places() -> None:
+    turned = replace(
+        VIPER,
+        sign=(1, 1, 1, -1, 1, 1),
+        offset_deg=(0, 0, 0, 10, 0, 0),
+        lower_deg=(*VIPER.lower_deg[:3], -50, *VIPER.lower_deg[4:]),
+    )
+    np.testing.assert_allclose(np.degrees(turned.limits[:, 3]), [10 - 190, 10 + 50])
+
+
+def test_a_sign_or_an_offset_of_an_arm_file_is_read(tmp_path: Path) -> None:
+    shipped = Path(__file__).parents[3] / "planner" / "arms" / "viper_s650.toml"
+    file = tmp_path / "arm.toml"
+    file.write_text(shipped.read_text().replace("d_mm = 80", "d_mm = 80\nsign = -1\noffset_deg = 30"))
+    assert Arm.load(file).sign == (1.0, 1.0, 1.0, 1.0, 1.0, -1.0)
+    assert Arm.load(file).offset_deg == (0.0, 0.0, 0.0, 0.0, 0.0, 30.0)

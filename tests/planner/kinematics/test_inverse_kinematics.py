@@ -1,9 +1,12 @@
 """The closed form against py-opw-kinematics, and against our own forward kinematics."""
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
 from py_opw_kinematics import KinematicModel, Robot
+from scipy.spatial.transform import Rotation
 
 from planner.arrays import FloatArray
 from planner.kinematics.arm import Arm
@@ -161,3 +164,70 @@ def test_each_joint_is_on_the_turn_nearest_mid_range() -> None:
 def test_a_pose_that_is_not_a_number_is_out_of_reach() -> None:
     _, reasons = inverse_kinematics(VIPER, np.full((1, 4, 4), np.nan))
     assert (reasons == Reason.OUT_OF_REACH).all()
+
+
+KUKA = Arm.load("kuka_kr6_r700")
+
+
+def with_conventions(arm: Arm, sign: tuple[float, ...], offset_deg: tuple[float, ...]) -> Arm:
+    """The same arm, its angles counted in another way; the limits hold the same postures."""
+    ends = (np.degrees(arm.limits) - offset_deg) * np.array(sign)
+    lower, upper = np.sort(ends, axis=0)
+    return replace(arm, sign=sign, offset_deg=offset_deg, lower_deg=tuple(lower), upper_deg=tuple(upper))
+
+
+def oracle_of_robot(arm: Arm) -> Robot:
+    """Return the ortho-parallel model that counts joints as the robot does: angle x sign - offset."""
+    mirror = np.array([1, -1, -1, 1, -1, 1]) if arm.alpha_deg[0] > 0 else np.ones(6)
+    upright = np.radians([0, -90, 90, 0, 0, 0])
+    model = KinematicModel(
+        a1=arm.a_mm[0],
+        a2=arm.a_mm[2],
+        b=(arm.d_mm[1] + arm.d_mm[2]) * mirror[1],
+        c1=arm.d_mm[0],
+        c2=arm.a_mm[1],
+        c3=arm.d_mm[3],
+        c4=arm.d_mm[5],
+        offsets=tuple(upright - mirror * np.radians(arm.offset_deg)),
+        flip_axes=tuple((mirror * np.array(arm.sign)) < 0),
+    )
+    return Robot(model, degrees=False)
+
+
+CONVENTIONS = [
+    KUKA,
+    with_conventions(VIPER, (1, -1, 1, -1, -1, 1), (0, -90, 180, 0, 0, 45)),
+    with_conventions(PUMA, (-1, 1, -1, 1, -1, -1), (30, 0, -90, 10, 0, 0)),
+]
+
+
+@pytest.mark.parametrize("arm", CONVENTIONS, ids=["kuka", "viper", "puma"])
+def test_the_robots_own_angles_are_those_of_an_oracle_with_signs_and_offsets(arm: Arm) -> None:
+    given_deg = np.random.default_rng(7).uniform(arm.lower_deg, arm.upper_deg, (2000, 6))
+    poses = oracle_of_robot(arm).batch_forward(np.radians(given_deg))
+    np.testing.assert_allclose(arm.flange_poses(arm.joints(given_deg)), poses.as_matrix(), atol=1e-9)
+    joints, reasons = inverse_kinematics(arm, poses.as_matrix())
+    expected = oracle_of_robot(arm).reach(poses).joints
+    for ours, found, reason in zip(joints, expected, reasons, strict=True):
+        robot = np.radians(arm.robot_deg(ours[reason != Reason.OUT_OF_REACH]))
+        gaps = angle_between(robot[:, np.newaxis], found[np.newaxis]).max(axis=2)
+        assert (np.nan_to_num(gaps, nan=9.0).min(axis=1) < 1e-6).all()
+    rows, slots = np.arange(len(given_deg)), configurations(arm, arm.joints(given_deg))
+    regular = away_from_singularities(arm, arm.joints(given_deg))
+    assert (reasons[rows, slots][regular] == Reason.REACHED).all()
+
+
+def test_the_kuka_is_where_its_makers_frames_and_another_program_put_it() -> None:
+    """Its URDF's chain of joints, and a pose from the tests of Jmeyer1292/opw_kinematics, copied there from MoveIt."""
+    axes = np.array([[0, 0, -1], [0, 1, 0], [0, 1, 0], [-1, 0, 0], [0, 1, 0], [-1, 0, 0]])
+    steps_mm = np.array([[0, 0, 400], [25, 0, 0], [315, 0, 0], [0, 0, 35], [365, 0, 0], [80, 0, 0]])
+    for robot_deg in np.random.default_rng(8).uniform(KUKA.lower_deg, KUKA.upper_deg, (50, 6)):
+        expected = np.eye(4)
+        for axis, step_mm, angle in zip(axes, steps_mm, np.radians(robot_deg), strict=True):
+            joint = np.eye(4)
+            joint[:3, :3], joint[:3, 3] = Rotation.from_rotvec(axis * angle).as_matrix(), step_mm
+            expected = expected @ joint
+        expected[:3, :3] = expected[:3, :3] @ Rotation.from_euler("y", 90.0, degrees=True).as_matrix()
+        np.testing.assert_allclose(KUKA.flange_poses(KUKA.joints(robot_deg[np.newaxis]))[0], expected, atol=1e-9)
+    pose = KUKA.flange_poses(KUKA.joints(np.degrees(np.full((1, 6), 0.2))))[0]
+    np.testing.assert_allclose(pose[:3, 3], [734.1169, -152.0347, 182.639], atol=1e-4)

@@ -211,3 +211,27 @@ def test_progress_is_told_between_blocks_and_may_end_the_work() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         build_maps(cylinder(), ALL, 36, interrupt)
+
+
+def test_an_arm_whose_angles_are_counted_in_another_way_has_the_same_map() -> None:
+    posed = cylinder(6)
+    arm = posed.cell.arm
+    sign, offset_deg = (-1.0, 1.0, -1.0, 1.0, -1.0, -1.0), (0.0, 90.0, -180.0, 0.0, 0.0, 20.0)
+    lower, upper = np.sort((np.degrees(arm.limits) - offset_deg) * np.array(sign), axis=0)
+    own = replace(arm, sign=sign, offset_deg=offset_deg, lower_deg=tuple(lower), upper_deg=tuple(upper))
+    seen: list[RatedPoses] = []
+
+    def look(poses: RatedPoses) -> Array:
+        seen.append(poses)
+        return np.ones(len(poses.joints))
+
+    value = replace(posed.value, user_factors=(UserFactor("look", look),))
+    slot = Configuration.LEFTY_ABOVE_NOFLIP
+    maps = [
+        build_maps(replace(posed, cell=replace(posed.cell, arm=each), value=value), [slot], 24)[slot]
+        for each in (arm, own)
+    ]
+    np.testing.assert_allclose(maps[0].values, maps[1].values, atol=1e-9)
+    assert (maps[0].reasons == maps[1].reasons).all()
+    plain, counted = (np.degrees(poses.joints) for poses in seen)
+    np.testing.assert_allclose(plain, counted * sign + offset_deg, atol=1e-9)
