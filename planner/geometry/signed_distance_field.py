@@ -152,7 +152,7 @@ def look_up(values: NDArray[np.float32], origin: FloatArray, spacing: float, x: 
     """Return the signed distance in mm at a point of the mesh's frame.
 
     On the grid it is trilinear, so at most half a cell's diagonal off. Beyond it, it is a lower bound: the way to
-    the mesh is the longest side of a triangle with a blunt angle at the grid's nearest point.
+    the mesh is the longest side of a triangle with a blunt angle at the grid's nearest point, and ends in the mesh's box.
     """
     nx, ny, nz = values.shape
     gx, gy, gz = (x - origin[0]) / spacing, (y - origin[1]) / spacing, (z - origin[2]) / spacing
@@ -168,7 +168,9 @@ def look_up(values: NDArray[np.float32], origin: FloatArray, spacing: float, x: 
     outside = dx * dx + dy * dy + dz * dz
     if outside == 0.0:
         return inside
-    return sqrt(outside + max(inside, 0.0) ** 2)
+    # The grid reaches a cell beyond the mesh on each side, so the box that it leaves within holds the mesh.
+    bx, by, bz = max(1.0 - gx, gx - nx + 2.0, 0.0), max(1.0 - gy, gy - ny + 2.0, 0.0), max(1.0 - gz, gz - nz + 2.0, 0.0)
+    return max(sqrt(outside + max(inside, 0.0) ** 2), spacing * sqrt(bx * bx + by * by + bz * bz))
 
 
 @kernel
