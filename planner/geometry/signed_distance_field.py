@@ -152,7 +152,7 @@ def look_up(values: NDArray[np.float32], origin: FloatArray, spacing: float, x: 
     """Return the signed distance in mm at a point of the mesh's frame.
 
     On the grid it is trilinear, so at most half a cell's diagonal off. Beyond it, it is a lower bound: the way to
-    the mesh is the longest side of a triangle with a blunt angle at the grid's nearest point, and ends in the mesh's box.
+    the mesh is the longest side of a triangle with a blunt angle at the nearest grid point. It ends in the mesh box.
     """
     nx, ny, nz = values.shape
     gx, gy, gz = (x - origin[0]) / spacing, (y - origin[1]) / spacing, (z - origin[2]) / spacing
