@@ -232,6 +232,6 @@ def test_an_arm_whose_angles_are_counted_in_another_way_has_the_same_map() -> No
         for each in (arm, own)
     ]
     np.testing.assert_allclose(maps[0].values, maps[1].values, atol=1e-9)
-    assert (maps[0].reasons == maps[1].reasons).all()
+    np.testing.assert_array_equal(maps[0].reasons, maps[1].reasons)
     plain, counted = (np.degrees(poses.joints) for poses in seen)
     np.testing.assert_allclose(plain, counted * sign + offset_deg, atol=1e-9)
