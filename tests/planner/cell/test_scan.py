@@ -188,4 +188,4 @@ def test_another_arm_without_bodies_is_refused_with_how_to_give_them(tmp_path: P
 def test_a_shipped_arm_brings_its_own_bodies(tmp_path: Path) -> None:
     scan = load_scan(changed(tmp_path, "sphere", '"viper_s650"', '"kuka_kr6_r700"'))
     assert scan.cell.arm.name == "KUKA KR 6 R700 sixx"
-    assert scan.bodies.parts[0].radius_mm == 128.0
+    assert scan.bodies.parts[0].radius_mm == 130.0
