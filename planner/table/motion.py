@@ -15,6 +15,20 @@ class Limits(NamedTuple):
     acceleration_deg_s2: float = 100.0
 
 
+class Motion(NamedTuple):
+    """A motion along n steps, as Eq. (3) and (4) have it.
+
+    Attributes:
+        angles_deg: (n + 1,) unwrapped angle at each column.
+        speeds_deg_s: (n + 1,) speed there.
+        accelerations_deg_s2: (n,) acceleration of each step.
+    """
+
+    angles_deg: FloatArray
+    speeds_deg_s: FloatArray
+    accelerations_deg_s2: FloatArray
+
+
 @kernel
 def next_speed(speed_deg_s: float, acceleration_deg_s2: float, step_s: float) -> float:
     """Eq. (3): the speed one step later."""
