@@ -39,6 +39,11 @@ def free_runs(allowed: BoolArray) -> RunArray:
     return runs
 
 
+def free_runs_down(allowed: BoolArray) -> RunArray:
+    """Count as `free_runs` does, but downwards in angle."""
+    return np.ascontiguousarray(free_runs(np.ascontiguousarray(allowed[:, ::-1]))[:, ::-1])
+
+
 @kernel
 def crossing_is_allowed(runs: RunArray, step: int, lowest_deg: float, highest_deg: float) -> bool:
     """Tell whether the angles from `lowest_deg` to `highest_deg` are allowed all the way through one step."""

@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.arrays import CostArray, FloatArray
+from planner.arrays import CostArray
 from planner.kernel import kernel
 from planner.map.config_map import SAMPLE_TOLERANCE, column_value, sample_at_or_above, sample_at_or_below, wrapped
+from planner.planning.crossing import RunArray
 from planner.planning.problem import Terms
 from planner.table.cost import value_cost
 from planner.table.motion import Motion
@@ -39,16 +40,16 @@ class Lattice(NamedTuple):
         reference: what angles and speeds are counted from. It need not avoid forbidden regions.
         node_deg: h, the distance of two nodes.
         half_count: i runs from -half_count to half_count.
-        first: the first q.
-        count: how many q there are.
-        is_closed: whether q goes around the turn, in `count` steps; if not, the lattice is a tube around the reference.
+        first_q: the first q.
+        q_count: how many q there are.
+        is_closed: whether q goes around the turn, in `q_count` steps; if not, the lattice is a tube around the reference.
     """
 
     reference: Motion
     node_deg: float
     half_count: int
-    first: int
-    count: int
+    first_q: int
+    q_count: int
     is_closed: bool
 
 
@@ -56,7 +57,7 @@ class StepRows(NamedTuple):
     """What is known of each node p before the step from column k to the next.
 
     The nodes are in two rows, even and odd, so that p = 2 q + i is found in row i & 1 at place
-    q + (i >> 1) - lattice.first + margin, and neighbouring q are neighbours in memory.
+    q + (i >> 1) - lattice.first_q + margin, and neighbouring q are neighbours in memory.
 
     Attributes:
         room_above: greatest change i + j of a step that stays allowed upwards; far below any where p is forbidden.
@@ -68,8 +69,8 @@ class StepRows(NamedTuple):
 
     room_above: CostArray
     room_below: CostArray
-    turn_above: FloatArray
-    turn_below: FloatArray
+    turn_above: CostArray
+    turn_below: CostArray
     value_cost: CostArray
 
 
@@ -94,12 +95,12 @@ def margin(lattice: Lattice) -> int:
 @kernel
 def make_rows(lattice: Lattice) -> StepRows:
     """Return room for what `lay_out_step` writes."""
-    shape = (2, lattice.count + 2 * margin(lattice))
+    shape = (2, lattice.q_count + 2 * margin(lattice))
     return StepRows(
         np.empty(shape, dtype=np.float32),
         np.empty(shape, dtype=np.float32),
-        np.empty(shape),
-        np.empty(shape),
+        np.empty(shape, dtype=np.float32),
+        np.empty(shape, dtype=np.float32),
         np.empty(shape, dtype=np.float32),
     )
 
@@ -107,18 +108,18 @@ def make_rows(lattice: Lattice) -> StepRows:
 @kernel
 def lay_out_step(terms: Terms, lattice: Lattice, column: int, rows: StepRows) -> None:
     """Write what the step from `column` to the next needs to know of its nodes."""
-    run_start, run_end = runs_of_step(terms, column)
     angles_deg, samples_per_deg = lattice.reference.angles_deg, terms.values.shape[1] / 360.0
     nodes_per_sample = 1.0 / (samples_per_deg * lattice.node_deg)
     moved = (angles_deg[column + 1] - angles_deg[column]) / lattice.node_deg
     unit = cost_unit(terms)
     for parity in range(2):
         for place in range(rows.value_cost.shape[1]):
-            offset_deg = (2 * (place + lattice.first - margin(lattice)) + parity) * lattice.node_deg
+            offset_deg = (2 * (place + lattice.first_q - margin(lattice)) + parity) * lattice.node_deg
             position = (angles_deg[column] + offset_deg) * samples_per_deg
-            above, below = _room(run_start, run_end, position)
+            above, below = _room(terms.runs, terms.runs_down, column, position)
             above, below = above * nodes_per_sample, below * nodes_per_sample
-            rows.turn_above[parity, place], rows.turn_below[parity, place] = above, below
+            rows.turn_above[parity, place] = -rounded_up(-above)
+            rows.turn_below[parity, place] = -rounded_up(-below)
             rows.room_above[parity, place] = np.floor(above - moved) if above >= 0.0 else NO_ROOM
             rows.room_below[parity, place] = np.floor(below + moved) if above >= 0.0 else NO_ROOM
             value = column_value(terms.values, terms.epsilon, column + 1, angles_deg[column + 1] + offset_deg)
@@ -126,35 +127,23 @@ def lay_out_step(terms: Terms, lattice: Lattice, column: int, rows: StepRows) ->
 
 
 @kernel
-def runs_of_step(terms: Terms, column: int) -> tuple[FloatArray, FloatArray]:
-    """Return, per sample, how far the samples allowed in `column` and the next reach, downwards and upwards.
-
-    In samples; -1 where the sample is forbidden, far more than a turn where the whole turn is allowed.
-    """
-    runs = terms.runs[column]
-    count = len(runs)
-    downwards, upwards = np.empty(count), np.empty(count)
-    length = 0
-    for i in range(-count, count):
-        length = length + 1 if runs[i] > 0 else 0
-        if i >= 0:
-            whole = runs[i] > count
-            upwards[i] = 1e9 if whole else runs[i] - 1.0
-            downwards[i] = 1e9 if whole else length - 1.0
-    return downwards, upwards
+def rounded_up(number: float) -> np.float32:
+    """Return the least number in single precision that is not below a number."""
+    single = np.float32(number)
+    return single if float(single) >= number else np.nextafter(single, np.float32(np.inf))
 
 
 @kernel
-def _room(downwards: FloatArray, upwards: FloatArray, position: float) -> tuple[float, float]:
+def _room(runs: RunArray, runs_down: RunArray, column: int, position: float) -> tuple[float, float]:
     """Return by how many samples one may move up and down from a position (in samples); -1 where it is forbidden.
 
-    Both lengths are rounded up by what still lies on a sample.
+    Both are longer by what still lies on a sample.
     """
     below, above = sample_at_or_below(position), sample_at_or_above(position)
-    index = wrapped(below, len(upwards))
-    if upwards[index] < above - below:
+    index = wrapped(below, runs.shape[1])
+    if runs[column, index] <= above - below:
         return -1.0, -1.0
     return (
-        below + upwards[index] - position + ON_A_SAMPLE,
-        position - below + downwards[index] + ON_A_SAMPLE,
+        below + runs[column, index] - 1.0 - position + ON_A_SAMPLE,
+        position - below + runs_down[column, index] - 1.0 + ON_A_SAMPLE,
     )

@@ -12,6 +12,7 @@ from planner.kernel import kernel
 from planner.map.config_map import column_value
 from planner.planning.problem import Problem, Terms
 from planner.table.cost import PathCost, acceleration_cost, speed_cost, value_cost
+from planner.table.motion import Motion
 
 
 class Pause(NamedTuple):
@@ -31,6 +32,8 @@ class Infeasibility(Enum):
     BLOCKED_LOCATION = "a scan location has no allowed table angle"
     START_FORBIDDEN = "the start is in a forbidden region"
     UNREACHABLE = "no motion within the limits avoids the forbidden regions"
+    """That is proved."""
+    NOT_FOUND = "none found: neither a motion that avoids the forbidden regions, nor a proof that there is none"
 
 
 @dataclass(frozen=True)
@@ -147,6 +150,11 @@ def obvious_infeasibility(problem: Problem, planner: str) -> NoPlan | None:
     if angle is not None and not problem.map.is_allowed(0, angle):
         return NoPlan(planner, Infeasibility.START_FORBIDDEN, 0)
     return None
+
+
+def motion_of(plan: Plan) -> Motion:
+    """Return the motion of a plan."""
+    return Motion(plan.angles_deg.copy(), plan.speeds_deg_s.copy(), plan.accelerations_deg_s2.copy())
 
 
 def greedy_start(problem: Problem) -> tuple[float, float]:

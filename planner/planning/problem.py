@@ -7,7 +7,7 @@ from typing import NamedTuple
 from planner.arrays import FloatArray
 from planner.errors import PlannerError
 from planner.map.config_map import ConfigurationMap
-from planner.planning.crossing import RunArray, free_runs
+from planner.planning.crossing import RunArray, free_runs, free_runs_down
 from planner.table.cost import Weights, default_weights, greatest_step_cost, pause_cost
 from planner.table.motion import Limits
 
@@ -17,11 +17,12 @@ class ProblemError(PlannerError):
 
 
 class Terms(NamedTuple):
-    """A problem as the compiled kernels take it."""
+    """A problem as the compiled kernels take it; `runs` and `runs_down` are from `free_runs`, up and down."""
 
     values: FloatArray
     epsilon: float
     runs: RunArray
+    runs_down: RunArray
     step_s: float
     speed_limit_deg_s: float
     acceleration_limit_deg_s2: float
@@ -59,8 +60,8 @@ class Problem:
         _check_positive("speed limit", "deg/s", self.limits.speed_deg_s)
         _check_positive("acceleration limit", "deg/s^2", self.limits.acceleration_deg_s2)
         weights = default_weights(self.limits) if self.weights is None else self.weights
-        _check_positive("weight of the acceleration", "1/(deg/s^2)^2", weights.acceleration)
-        _check_positive("weight of the speed", "1/(deg/s)^2", weights.speed)
+        _check_weight("acceleration", "1/(deg/s^2)^2", weights.acceleration)
+        _check_weight("speed", "1/(deg/s)^2", weights.speed)
         penalty = pause_cost(weights, self.limits)
         if not math.isfinite(penalty * self.map.location_count):
             raise ProblemError("the weights are so large that the cost of a path overflows; lower them")
@@ -69,6 +70,7 @@ class Problem:
             values=self.map.values,
             epsilon=self.map.epsilon,
             runs=free_runs(self.map.allowed),
+            runs_down=free_runs_down(self.map.allowed),
             step_s=float(self.step_s),
             speed_limit_deg_s=float(self.limits.speed_deg_s),
             acceleration_limit_deg_s2=float(self.limits.acceleration_deg_s2),
@@ -82,6 +84,14 @@ class Problem:
     def step_count(self) -> int:
         """n: the number of steps from the first column to the last."""
         return self.map.location_count - 1
+
+    @property
+    def attainable_speed_deg_s(self) -> float:
+        """The greatest speed that can occur along the path."""
+        if self.start_speed_deg_s is None:
+            return self.limits.speed_deg_s
+        gain_deg_s = self.limits.acceleration_deg_s2 * self.step_s
+        return min(self.limits.speed_deg_s, abs(self.start_speed_deg_s) + self.step_count * gain_deg_s)
 
     @property
     def greatest_step_cost(self) -> float:
@@ -99,3 +109,8 @@ class Problem:
 def _check_positive(name: str, unit: str, value: float) -> None:
     if not (math.isfinite(value) and value > 0.0):
         raise ProblemError(f"the {name} is {value} {unit}; allowed is any finite value above 0")
+
+
+def _check_weight(name: str, unit: str, value: float) -> None:
+    if not (math.isfinite(value) and value >= 0.0):
+        raise ProblemError(f"the weight of the {name} is {value} {unit}; allowed is any finite value from 0 on")

@@ -69,37 +69,10 @@ def default_grid(
     angle_count = problem.map.angle_count * refinement
     half = (speed_count - 1) // 2
     gain_deg_s = problem.limits.acceleration_deg_s2 * problem.step_s
-    top_deg_s = _attainable_speed(problem)
+    top_deg_s = problem.attainable_speed_deg_s
     if gain_deg_s >= 2.0 * top_deg_s:
         return Grid(angle_count, 0.0, top_deg_s / half, half, ladder(2 * half, jump_count))
     reach = max(least_reach, round(gain_deg_s * half / top_deg_s))
     step_deg_s = gain_deg_s / reach
     half_count = max(1, math.floor(top_deg_s / step_deg_s + SAMPLE_TOLERANCE))
     return Grid(angle_count, 0.0, step_deg_s, half_count, ladder(reach, jump_count))
-
-
-def exact_grid(problem: Problem, refinement: int, jump_count: int = 21) -> Grid:
-    """Return a grid on which every step ends exactly on a node, so that nothing is interpolated.
-
-    A step from speed i to speed j moves the angle by (i + j) / 2 speed steps x time; with the speed step at two angle
-    steps per time step, that is i + j angle steps.
-
-    Args:
-        problem: what is to be crossed; the angles of the grid count from its start angle.
-        refinement: angles of the grid per sample of the map.
-        jump_count: changes of speed per step, at most.
-    """
-    angle_count = problem.map.angle_count * refinement
-    step_deg_s = 2.0 * 360.0 / angle_count / problem.step_s
-    half_count = math.floor(_attainable_speed(problem) / step_deg_s + SAMPLE_TOLERANCE)
-    reach = math.floor(problem.limits.acceleration_deg_s2 * problem.step_s / step_deg_s + SAMPLE_TOLERANCE)
-    jumps = ladder(min(reach, 2 * half_count), jump_count)
-    return Grid(angle_count, problem.start_angle_deg or 0.0, step_deg_s, half_count, jumps)
-
-
-def _attainable_speed(problem: Problem) -> float:
-    """Return the greatest speed that can occur along the path."""
-    if problem.start_speed_deg_s is None:
-        return problem.limits.speed_deg_s
-    gain_deg_s = problem.limits.acceleration_deg_s2 * problem.step_s
-    return min(problem.limits.speed_deg_s, abs(problem.start_speed_deg_s) + problem.step_count * gain_deg_s)

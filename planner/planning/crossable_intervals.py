@@ -1,0 +1,235 @@
+"""From which angles can the rest of the map be crossed? Exactly, without a grid of angles.
+
+For a column and a speed these angles are a union of intervals: a step to another speed shifts those of the next column
+back by the angle that it moves, and a run of samples that are allowed in both columns clips them. Only the speeds are
+on a grid. It finds ways that no lattice has: close to the limits, or through gaps that a lattice meets at one speed.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.arrays import FloatArray, IndexArray
+from planner.kernel import kernel
+from planner.map.config_map import SAMPLE_TOLERANCE, column_value
+from planner.planning.crossing import RunArray, step_is_allowed
+from planner.planning.interval_union import contains, unite
+from planner.planning.problem import Problem, Terms
+from planner.table.cost import acceleration_cost, speed_cost, value_cost
+from planner.table.motion import Motion, next_angle, swept_angles
+
+# Shares of what still lies on a sample: so much is a run longer, and so much an angle may lie outside an interval.
+LONGER = 0.2 * SAMPLE_TOLERANCE
+OUTSIDE = 0.4 * SAMPLE_TOLERANCE
+ROUNDING = 1e-9
+
+
+class Crossable(NamedTuple):
+    """The crossable angles per column and speed.
+
+    Attributes:
+        speeds_deg_s: (n_speeds,) ascending.
+        first: (n + 1, n_speeds) where the intervals of a column and speed begin.
+        interval_count: (n + 1, n_speeds) and how many there are.
+        lows: lower ends, in samples from 0 up to a turn.
+        highs: upper ends.
+    """
+
+    speeds_deg_s: FloatArray
+    first: IndexArray
+    interval_count: IndexArray
+    lows: FloatArray
+    highs: FloatArray
+
+
+def crossing_motion(problem: Problem, speeds_per_gain: int) -> Motion | None:
+    """Return a motion across the map from the problem's start, not a cheap one; None where these speeds have none.
+
+    Args:
+        problem: what is to be crossed.
+        speeds_per_gain: speeds within what the acceleration limit gains in a step; the limits and the start are others.
+    """
+    crossable = crossable_intervals(problem.terms, speeds_of(problem, speeds_per_gain))
+    start = _start(problem, crossable)
+    if start is None:
+        return None
+    motion = follow(problem.terms, crossable, *start)
+    return motion if len(motion.accelerations_deg_s2) > 0 else None
+
+
+def speeds_of(problem: Problem, speeds_per_gain: int) -> FloatArray:
+    """Return the speeds to use: multiples of a part of what a step gains, both limits, and the start."""
+    limit, gain = problem.limits.speed_deg_s, problem.limits.acceleration_deg_s2 * problem.step_s
+    step = min(gain, limit) / speeds_per_gain
+    positive = np.arange(int(problem.attainable_speed_deg_s / step + ROUNDING) + 1) * step
+    start = [] if problem.start_speed_deg_s is None else [problem.start_speed_deg_s]
+    speeds = np.unique(np.concatenate((-positive, positive, [-limit, limit], start)))
+    return speeds[np.concatenate(([True], np.diff(speeds) > ROUNDING * limit)) | np.isin(speeds, start)]
+
+
+def _start(problem: Problem, crossable: Crossable) -> tuple[float, int] | None:
+    """Return a start from which the map can be crossed: where the angle is free, the middle of the widest interval."""
+    turn, start_speed = float(problem.map.angle_count), problem.start_speed_deg_s
+    best, widest = None, -1.0
+    for s in range(len(crossable.speeds_deg_s)):
+        if start_speed is not None and crossable.speeds_deg_s[s] != start_speed:
+            continue
+        intervals = slice(crossable.first[0, s], crossable.first[0, s] + crossable.interval_count[0, s])
+        lows, highs = crossable.lows[intervals], crossable.highs[intervals]
+        if problem.start_angle_deg is not None:
+            position = problem.start_angle_deg * turn / 360.0 % turn
+            if contains(lows, highs, position, turn, OUTSIDE):
+                return problem.start_angle_deg, s
+        elif len(lows) > 0 and (highs - lows).max() > widest:
+            at = int(np.argmax(highs - lows))
+            widest = float(highs[at] - lows[at])
+            best = 0.5 * float(lows[at] + highs[at]) * 360.0 / turn, s
+    return best
+
+
+@kernel
+def runs_of(runs: RunArray, step: int) -> tuple[FloatArray, FloatArray]:
+    """Return first and last sample of each run that is allowed throughout a step; (0, a turn) for a whole turn."""
+    count: int = runs.shape[1]
+    lows, highs = np.empty(count), np.empty(count)
+    found = 0
+    if runs[step, 0] > count:
+        return np.zeros(1), np.full(1, float(count))
+    for i in range(count):
+        if runs[step, i] > 0 and runs[step, i - 1] == 0:
+            lows[found], highs[found] = i, i + runs[step, i] - 1.0
+            found += 1
+    return lows[:found], highs[:found]
+
+
+@kernel
+def crossable_intervals(terms: Terms, speeds_deg_s: FloatArray) -> Crossable:
+    """Return from which angles the rest can be crossed, per column and speed, with steps between the given speeds."""
+    steps, speeds, turn = len(terms.values) - 1, len(speeds_deg_s), float(terms.values.shape[1])
+    first, count = np.zeros((steps + 1, speeds), dtype=np.int64), np.zeros((steps + 1, speeds), dtype=np.int64)
+    lows, highs = np.zeros(1024), np.full(1024, turn)
+    count[steps], end = 1, 1
+    piece_lows, piece_highs = np.empty(1024), np.empty(1024)
+    gain = terms.acceleration_limit_deg_s2 * terms.step_s * (1.0 + ROUNDING)
+    for k in range(steps - 1, -1, -1):
+        run_lows, run_highs = runs_of(terms.runs, k)
+        for s in range(speeds):
+            pieces = 0
+            for t in range(speeds):
+                if abs(speeds_deg_s[t] - speeds_deg_s[s]) > gain:
+                    continue
+                a, b = first[k + 1, t], first[k + 1, t] + count[k + 1, t]
+                if a == b:
+                    continue
+                most = pieces + (b - a + 1) * (len(run_lows) + 2) * 2
+                if most > len(piece_lows):
+                    piece_lows = np.concatenate((piece_lows, np.empty(most)))
+                    piece_highs = np.concatenate((piece_highs, np.empty(most)))
+                pieces = _step_back(
+                    terms,
+                    speeds_deg_s[s],
+                    speeds_deg_s[t],
+                    lows[a:b],
+                    highs[a:b],
+                    run_lows,
+                    run_highs,
+                    piece_lows,
+                    piece_highs,
+                    pieces,
+                )
+            pieces = unite(piece_lows, piece_highs, pieces, turn)
+            while end + pieces > len(lows):
+                lows, highs = np.concatenate((lows, np.empty(len(lows)))), np.concatenate((highs, np.empty(len(highs))))
+            lows[end : end + pieces], highs[end : end + pieces] = piece_lows[:pieces], piece_highs[:pieces]
+            first[k, s], count[k, s] = end, pieces
+            end += pieces
+        if count[k].max() == 0:
+            break
+    return Crossable(speeds_deg_s, first, count, lows[:end], highs[:end])
+
+
+@kernel
+def _step_back(
+    terms: Terms,
+    speed: float,
+    later: float,
+    lows: FloatArray,
+    highs: FloatArray,
+    run_lows: FloatArray,
+    run_highs: FloatArray,
+    piece_lows: FloatArray,
+    piece_highs: FloatArray,
+    pieces: int,
+) -> int:
+    """Append the angles from which a step between two speeds leads into given intervals; return the new count."""
+    turn = float(terms.values.shape[1])
+    samples_per_deg = turn / 360.0
+    acceleration = (later - speed) / terms.step_s
+    lowest, highest = swept_angles(0.0, speed, acceleration, terms.step_s)
+    lowest, highest = lowest * samples_per_deg, highest * samples_per_deg
+    moved = 0.5 * (speed + later) * terms.step_s * samples_per_deg
+    whole = run_highs[0] - run_lows[0] >= turn if len(run_lows) > 0 else False
+    for i in range(len(lows)):
+        low, length = lows[i] - moved, highs[i] - lows[i]
+        low -= turn * np.floor(low / turn)
+        if whole:
+            piece_lows[pieces], piece_highs[pieces] = low, low + length
+            pieces += 1
+            continue
+        for r in range(len(run_lows)):
+            run_low, run_high = run_lows[r] - LONGER - lowest, run_highs[r] + LONGER - highest
+            if run_low > run_high:
+                continue
+            # The copy of the run that is the first to end above `low`, and those after it that begin below `high`.
+            turned = turn * np.ceil((low - run_high) / turn)
+            while run_low + turned <= low + length:
+                piece_low, piece_high = max(low, run_low + turned), min(low + length, run_high + turned)
+                back = turn * np.floor(piece_low / turn)
+                piece_lows[pieces], piece_highs[pieces] = piece_low - back, piece_high - back
+                pieces += 1
+                turned += turn
+    return pieces
+
+
+@kernel
+def follow(terms: Terms, crossable: Crossable, angle_deg: float, speed: int) -> Motion:
+    """Return a motion across the map from a crossable state: of the steps that keep it so, the cheapest each time."""
+    steps, speeds_deg_s = len(terms.values) - 1, crossable.speeds_deg_s
+    angles, speeds, accelerations = np.empty(steps + 1), np.empty(steps + 1), np.empty(steps)
+    angles[0], speeds[0] = angle_deg, speeds_deg_s[speed]
+    for k in range(steps):
+        least, best = np.inf, -1
+        for t in range(len(speeds_deg_s)):
+            cost = _cost(terms, crossable, k, angles[k], speeds[k], t)
+            if cost < least:
+                least, best = cost, t
+        if best < 0:
+            return Motion(angles[:0], speeds[:0], accelerations[:0])
+        accelerations[k] = (speeds_deg_s[best] - speeds[k]) / terms.step_s
+        angles[k + 1] = next_angle(angles[k], speeds[k], accelerations[k], terms.step_s)
+        speeds[k + 1] = speeds_deg_s[best]
+    return Motion(angles, speeds, accelerations)
+
+
+@kernel
+def _cost(terms: Terms, crossable: Crossable, column: int, angle_deg: float, speed_deg_s: float, t: int) -> float:
+    later = crossable.speeds_deg_s[t]
+    turn = float(terms.values.shape[1])
+    acceleration = (later - speed_deg_s) / terms.step_s
+    if abs(acceleration) > terms.acceleration_limit_deg_s2 * (1.0 + ROUNDING):
+        return np.inf
+    end_deg = next_angle(angle_deg, speed_deg_s, acceleration, terms.step_s)
+    position = end_deg * turn / 360.0
+    position -= turn * np.floor(position / turn)
+    first = crossable.first[column + 1, t]
+    last = first + crossable.interval_count[column + 1, t]
+    if not contains(crossable.lows[first:last], crossable.highs[first:last], position, turn, OUTSIDE):
+        return np.inf
+    if not step_is_allowed(terms.runs, column, angle_deg, speed_deg_s, acceleration, terms.step_s):
+        return np.inf
+    value = column_value(terms.values, terms.epsilon, column + 1, end_deg)
+    return (
+        acceleration_cost(terms.acceleration_weight, acceleration)
+        + speed_cost(terms.speed_weight, later)
+        + value_cost(value)
+    )

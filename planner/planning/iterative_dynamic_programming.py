@@ -1,0 +1,64 @@
+"""Refine a plan: dynamic programming in a tube around it, again and again, on ever finer lattices (Luus, 1990).
+
+The lattice is laid around the plan itself. Offset 0 is the plan, so a pass can never lose it; a pass is kept only if
+the exact cost falls. The result is limited by no grid any more, only by the way that the plan takes around obstacles.
+"""
+
+from collections.abc import Callable
+
+from planner.planning.lattice import Lattice
+from planner.planning.lattice_search import best_motion
+from planner.planning.plan import Plan, make_plan, motion_of
+from planner.planning.problem import Problem
+
+# The tube: speeds each way, and q from -Q_COUNT / 2 up. Eight single numbers make a vector.
+SPEEDS_EACH_WAY = 4
+Q_COUNT = 16
+
+PASSES = 4
+
+# The spacing stays where a pass gains more than this share.
+LARGE_GAIN = 0.01
+MOST_PASSES = 12
+
+
+def any_plan(_plan: Plan) -> bool:
+    """Accept every plan."""
+    return True
+
+
+def refine(problem: Problem, plan: Plan, node_deg: float, accepts: Callable[[Plan], bool] = any_plan) -> Plan:
+    """Return a plan of at most the same cost, with the same name.
+
+    Args:
+        problem: what is crossed.
+        plan: where to begin; without pauses.
+        node_deg: spacing to begin with, halved from pass to pass.
+        accepts: what else a plan must fulfil; a pass whose plan it refuses is not kept.
+    """
+    passes = 0
+    for _ in range(MOST_PASSES):
+        better = best_around(problem, plan, tube(plan, node_deg))
+        gain = plan.cost.total - better.cost.total
+        if gain > 0.0 and accepts(better):
+            plan = better
+        if gain < LARGE_GAIN * plan.cost.total:
+            node_deg *= 0.5
+            passes += 1
+        if passes == PASSES:
+            break
+    return plan
+
+
+def tube(plan: Plan, node_deg: float) -> Lattice:
+    """Return the lattice of the states near a plan."""
+    return Lattice(motion_of(plan), node_deg, SPEEDS_EACH_WAY, -Q_COUNT // 2, Q_COUNT, is_closed=False)
+
+
+def best_around(problem: Problem, plan: Plan, lattice: Lattice) -> Plan:
+    """Return the best plan of a lattice around a plan: that plan where none is cheaper."""
+    motion = best_motion(problem, lattice)
+    if motion is None:
+        return plan
+    better = make_plan(problem, plan.planner, *motion)
+    return better if better.cost.total < plan.cost.total else plan

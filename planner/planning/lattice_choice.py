@@ -1,0 +1,54 @@
+"""Which lattice to search: fine enough for the limits, small enough for the time there is."""
+
+import math
+from collections.abc import Iterator
+
+from planner.planning.lattice import Lattice
+from planner.planning.problem import Problem
+from planner.planning.reference_motion import reference_motion
+from planner.table.motion import Motion
+
+# A rounding error below this does not lose a speed.
+ROUNDING = 1e-9
+
+# Share of the greatest speed that a speed of the lattice must reach.
+NEARLY = 0.95
+
+# 200 MB.
+MOST_STATES = 50_000_000
+
+
+def turn_lattice(problem: Problem, speed_count: int, work: int, reference: Motion | None = None) -> Lattice | None:
+    """Return the coarsest lattice around the turn with at least so many speeds each way; None where all are too large.
+
+    Its nodes at rest are the samples of the map, a multiple of them, or, where samples are closer than needed, every
+    second, third .. sample. Its greatest speed is nearly the greatest that can occur, and the acceleration limit lies
+    at least two speeds away, or one where two are too many for `work`.
+
+    Args:
+        problem: what is to be crossed.
+        speed_count: speeds each way, at least.
+        work: steps per column, at most.
+        reference: motion to lay the lattice around; without one, that of `reference_motion`.
+    """
+    motion = reference_motion(problem) if reference is None else reference
+    for least_reach in (2, 1):
+        for rests in _rests_per_turn(problem.map.angle_count):
+            unit_deg_s = 360.0 / rests / problem.step_s
+            half_count = math.floor(problem.attainable_speed_deg_s / unit_deg_s + ROUNDING)
+            reach = math.floor(problem.limits.acceleration_deg_s2 * problem.step_s / unit_deg_s + ROUNDING)
+            speeds = 2 * half_count + 1
+            if rests * speeds * min(2 * reach + 1, speeds) > work:
+                break
+            if rests * speeds * problem.map.location_count > MOST_STATES:
+                break
+            nearly = half_count * unit_deg_s >= NEARLY * problem.attainable_speed_deg_s
+            if half_count >= speed_count and reach >= least_reach and nearly:
+                return Lattice(motion, 180.0 / rests, half_count, 0, rests, is_closed=True)
+    return None
+
+
+def _rests_per_turn(sample_count: int) -> Iterator[int]:
+    """Yield how many angles of rest a turn may have, ascending: a part of the samples, all, or a multiple."""
+    yield from (count for count in range(1, sample_count) if sample_count % count == 0)
+    yield from (sample_count * multiple for multiple in range(1, 10_000))
