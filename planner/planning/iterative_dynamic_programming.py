@@ -50,9 +50,9 @@ def refine(problem: Problem, plan: Plan, node_deg: float, accepts: Callable[[Pla
     return plan
 
 
-def tube(plan: Plan, node_deg: float) -> Lattice:
+def tube(plan: Plan, node_deg: float, speeds_each_way: int = SPEEDS_EACH_WAY, q_count: int = Q_COUNT) -> Lattice:
     """Return the lattice of the states near a plan."""
-    return Lattice(motion_of(plan), node_deg, SPEEDS_EACH_WAY, -Q_COUNT // 2, Q_COUNT, is_closed=False)
+    return Lattice(motion_of(plan), node_deg, speeds_each_way, -q_count // 2, q_count, is_closed=False)
 
 
 def best_around(problem: Problem, plan: Plan, lattice: Lattice) -> Plan:

@@ -13,10 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.arrays import CostArray
+from planner.arrays import CostArray, FloatArray, IndexArray
 from planner.kernel import kernel
-from planner.map.config_map import SAMPLE_TOLERANCE, column_value, sample_at_or_above, sample_at_or_below, wrapped
-from planner.planning.crossing import RunArray
+from planner.map.config_map import SAMPLE_TOLERANCE, sample_at_or_below, wrapped
 from planner.planning.problem import Terms
 from planner.table.cost import value_cost
 from planner.table.motion import Motion
@@ -65,6 +64,8 @@ class StepRows(NamedTuple):
         turn_above: how far above p the table may turn back, in nodes.
         turn_below: how far below.
         value_cost: first term of Eq. (6) in units, at p as a node of column k + 1.
+        sample: the sample at or below p.
+        fraction: how far p lies above it, in samples; 0 on it.
     """
 
     room_above: CostArray
@@ -72,6 +73,8 @@ class StepRows(NamedTuple):
     turn_above: CostArray
     turn_below: CostArray
     value_cost: CostArray
+    sample: IndexArray
+    fraction: FloatArray
 
 
 @kernel
@@ -102,28 +105,59 @@ def make_rows(lattice: Lattice) -> StepRows:
         np.empty(shape, dtype=np.float32),
         np.empty(shape, dtype=np.float32),
         np.empty(shape, dtype=np.float32),
+        np.empty(shape, dtype=np.int64),
+        np.empty(shape),
     )
 
 
 @kernel
 def lay_out_step(terms: Terms, lattice: Lattice, column: int, rows: StepRows) -> None:
-    """Write what the step from `column` to the next needs to know of its nodes."""
+    """Write what the step from `column` to the next needs to know of its nodes; columns go from the last to the first."""
     angles_deg, samples_per_deg = lattice.reference.angles_deg, terms.values.shape[1] / 360.0
     nodes_per_sample = 1.0 / (samples_per_deg * lattice.node_deg)
     moved = (angles_deg[column + 1] - angles_deg[column]) / lattice.node_deg
-    unit = cost_unit(terms)
+    if column + 2 == len(angles_deg):
+        _place_nodes(lattice, angles_deg[column + 1] * samples_per_deg, samples_per_deg, terms.values.shape[1], rows)
+    _lay_out_values(terms, column + 1, rows)
+    if moved != 0.0:
+        _place_nodes(lattice, angles_deg[column] * samples_per_deg, samples_per_deg, terms.values.shape[1], rows)
+    runs, runs_down = terms.runs[column], terms.runs_down[column]
     for parity in range(2):
         for place in range(rows.value_cost.shape[1]):
-            offset_deg = (2 * (place + lattice.first_q - margin(lattice)) + parity) * lattice.node_deg
-            position = (angles_deg[column] + offset_deg) * samples_per_deg
-            above, below = _room(terms.runs, terms.runs_down, column, position)
-            above, below = above * nodes_per_sample, below * nodes_per_sample
+            sample, fraction = rows.sample[parity, place], rows.fraction[parity, place]
+            is_allowed = runs[sample] > (1 if fraction > 0.0 else 0)
+            above = (runs[sample] - 1.0 - fraction + ON_A_SAMPLE) * nodes_per_sample
+            below = (runs_down[sample] - 1.0 + fraction + ON_A_SAMPLE) * nodes_per_sample
             rows.turn_above[parity, place] = -rounded_up(-above)
             rows.turn_below[parity, place] = -rounded_up(-below)
-            rows.room_above[parity, place] = np.floor(above - moved) if above >= 0.0 else NO_ROOM
-            rows.room_below[parity, place] = np.floor(below + moved) if above >= 0.0 else NO_ROOM
-            value = column_value(terms.values, terms.epsilon, column + 1, angles_deg[column + 1] + offset_deg)
-            rows.value_cost[parity, place] = value_cost(value) / unit if value > terms.epsilon else UNREACHABLE
+            rows.room_above[parity, place] = np.floor(above - moved) if is_allowed else NO_ROOM
+            rows.room_below[parity, place] = np.floor(below + moved) if is_allowed else NO_ROOM
+
+
+@kernel
+def _place_nodes(lattice: Lattice, origin: float, samples_per_deg: float, sample_count: int, rows: StepRows) -> None:
+    """Write at or above which sample each node lies, when the reference lies at `origin` (in samples)."""
+    for parity in range(2):
+        for place in range(rows.sample.shape[1]):
+            node = 2 * (place + lattice.first_q - margin(lattice)) + parity
+            position = origin + node * lattice.node_deg * samples_per_deg
+            below = sample_at_or_below(position)
+            fraction = position - below
+            rows.sample[parity, place] = wrapped(below, sample_count)
+            rows.fraction[parity, place] = fraction if fraction > SAMPLE_TOLERANCE else 0.0
+
+
+@kernel
+def _lay_out_values(terms: Terms, column: int, rows: StepRows) -> None:
+    """Write what the nodes cost in a column: the first term of Eq. (6), as `column_value` has it."""
+    values, unit, count = terms.values[column], cost_unit(terms), terms.values.shape[1]
+    for parity in range(2):
+        for place in range(rows.value_cost.shape[1]):
+            sample, fraction = rows.sample[parity, place], rows.fraction[parity, place]
+            lower, upper = values[sample], values[sample + 1 if sample + 1 < count else 0]
+            is_allowed = lower > terms.epsilon and (fraction == 0.0 or upper > terms.epsilon)
+            value = lower + fraction * (upper - lower)
+            rows.value_cost[parity, place] = value_cost(value) / unit if is_allowed else UNREACHABLE
 
 
 @kernel
@@ -131,19 +165,3 @@ def rounded_up(number: float) -> np.float32:
     """Return the least number in single precision that is not below a number."""
     single = np.float32(number)
     return single if float(single) >= number else np.nextafter(single, np.float32(np.inf))
-
-
-@kernel
-def _room(runs: RunArray, runs_down: RunArray, column: int, position: float) -> tuple[float, float]:
-    """Return by how many samples one may move up and down from a position (in samples); -1 where it is forbidden.
-
-    Both are longer by what still lies on a sample.
-    """
-    below, above = sample_at_or_below(position), sample_at_or_above(position)
-    index = wrapped(below, runs.shape[1])
-    if runs[column, index] <= above - below:
-        return -1.0, -1.0
-    return (
-        below + runs[column, index] - 1.0 - position + ON_A_SAMPLE,
-        position - below + runs_down[column, index] - 1.0 + ON_A_SAMPLE,
-    )

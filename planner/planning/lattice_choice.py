@@ -3,16 +3,16 @@
 import math
 from collections.abc import Iterator
 
-from planner.planning.lattice import Lattice
+from planner.planning.lattice import Lattice, speed_unit
 from planner.planning.problem import Problem
 from planner.planning.reference_motion import reference_motion
-from planner.table.motion import Motion
+from planner.table.motion import Limits, Motion
 
 # A rounding error below this does not lose a speed.
 ROUNDING = 1e-9
 
 # Share of the greatest speed that a speed of the lattice must reach.
-NEARLY = 0.95
+NEARLY = 0.97
 
 # 200 MB.
 MOST_STATES = 50_000_000
@@ -46,6 +46,21 @@ def turn_lattice(problem: Problem, speed_count: int, work: int, reference: Motio
             if half_count >= speed_count and reach >= least_reach and nearly:
                 return Lattice(motion, 180.0 / rests, half_count, 0, rests, is_closed=True)
     return None
+
+
+def with_limits_rounded_up(lattice: Lattice, problem: Problem) -> Lattice:
+    """Return the lattice with one speed more each way where its last one is below the greatest that can occur."""
+    unit_deg_s = speed_unit(lattice, problem.step_s)
+    return lattice._replace(half_count=math.ceil(problem.attainable_speed_deg_s / unit_deg_s - ROUNDING))
+
+
+def limits_rounded_up(lattice: Lattice, problem: Problem) -> Limits:
+    """Return the limits, rounded up to what steps of the lattice do."""
+    unit_deg_s, limits = speed_unit(lattice, problem.step_s), problem.limits
+    return Limits(
+        unit_deg_s * math.ceil(limits.speed_deg_s / unit_deg_s - ROUNDING),
+        unit_deg_s * math.ceil(limits.acceleration_deg_s2 * problem.step_s / unit_deg_s - ROUNDING) / problem.step_s,
+    )
 
 
 def _rests_per_turn(sample_count: int) -> Iterator[int]:

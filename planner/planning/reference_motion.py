@@ -4,7 +4,6 @@ A gap of one sample can be passed only at rest on that sample. So the reference 
 limits but without regard to forbidden regions: those are for the search around it.
 """
 
-
 import numpy as np
 
 from planner.map.config_map import SAMPLE_TOLERANCE
