@@ -23,6 +23,9 @@ LONGER = 0.2 * SAMPLE_TOLERANCE
 OUTSIDE = 0.4 * SAMPLE_TOLERANCE
 ROUNDING = 1e-9
 
+# 32 MB; speeds that split the angles into more are given up.
+MOST_INTERVALS = 2_000_000
+
 
 class Crossable(NamedTuple):
     """The crossable angles per column and speed.
@@ -143,7 +146,7 @@ def crossable_intervals(terms: Terms, speeds_deg_s: FloatArray) -> Crossable:
             lows[end : end + pieces], highs[end : end + pieces] = piece_lows[:pieces], piece_highs[:pieces]
             first[k, s], count[k, s] = end, pieces
             end += pieces
-        if count[k].max() == 0:
+        if count[k].max() == 0 or end > MOST_INTERVALS:
             break
     return Crossable(speeds_deg_s, first, count, lows[:end], highs[:end])
 

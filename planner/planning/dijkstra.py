@@ -1,11 +1,10 @@
-"""The paper's reference: the shortest path in the explicit graph of Eq. (8).
+"""The paper's reference: the shortest path in an explicit graph, by scipy.
 
-States are snapped to the cells (angle i, column j, speed k) of a grid after every step. On a grid where every step
-ends exactly on a node this is the true optimum; elsewhere the snapped motion is not what the table does, so the plan
-that is returned is its accelerations carried out with Eq. (3) and (4), which may drift into a forbidden region.
+Eq. (8) snaps each state to a cell. Off an exact lattice a snapped path is no motion: carried out, it drifts and enters
+forbidden regions. So the cells here are the nodes of a lattice on which every step ends exactly on a node. The path in
+the graph is the motion, and the optimum of that lattice.
 """
 
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,159 +14,134 @@ from scipy.sparse.csgraph import dijkstra as shortest_paths
 
 from planner.arrays import FloatArray, IndexArray
 from planner.kernel import kernel
-from planner.map.config_map import column_value
+from planner.map.config_map import column_value, wrapped
 from planner.planning.crossing import step_is_allowed
+from planner.planning.lattice import Lattice, motion_along, speed_unit
+from planner.planning.lattice_choice import turn_lattice
+from planner.planning.lattice_cost_to_go import steps_from
 from planner.planning.plan import Infeasibility, NoPlan, Outcome, make_plan, obvious_infeasibility
 from planner.planning.problem import Problem, Terms
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
-from planner.table.motion import next_angle, next_speed, roll_out
+from planner.table.motion import Motion
 
 NAME = "dijkstra"
 
-
-class Cells(NamedTuple):
-    """The discretisation of Eq. (8).
-
-    Attributes:
-        angle_count: cells over one turn, centred on multiples of 360 / angle_count degrees.
-        speed_count: cells of speed, odd; the outermost are centred on the limits.
-        acceleration_count: accelerations per node, evenly spaced between the limits, odd.
-    """
-
-    angle_count: int = 100
-    speed_count: int = 41
-    acceleration_count: int = 21
+# Speeds each way, from what is wanted to what must do; scipy needs 40 bytes an edge.
+SPEED_COUNTS = (10, 7, 5, 3, 2, 1)
+MOST_EDGES = 15_000_000
 
 
-class LatticePath(NamedTuple):
-    """The optimum of the discrete problem, as the cells see it.
+class ShortestPath(NamedTuple):
+    """The shortest path in the graph.
 
     Attributes:
-        angles_deg: (n + 1,) unwrapped centres of the cells passed.
-        speeds_deg_s: (n + 1,) their speeds.
-        accelerations_deg_s2: (n,) accelerations that lead from each to the next, before snapping.
-        cost: Eq. (7) along the graph.
+        motion: the path.
+        cost: its length in the graph: Eq. (7).
     """
 
-    angles_deg: FloatArray
-    speeds_deg_s: FloatArray
-    accelerations_deg_s2: FloatArray
+    motion: Motion
     cost: float
 
 
-def dijkstra(problem: Problem, cells: Cells | None = None) -> Outcome:
-    """Return the accelerations of the shortest path in the graph, carried out with exact kinematics."""
+class Edges(NamedTuple):
+    """The edges of all nodes in turn; a node is (column, speed, q), q last.
+
+    Attributes:
+        lengths: cost of each, plus an offset.
+        targets: the node that each leads to.
+        ends: (n_nodes,) where those of each node end.
+    """
+
+    lengths: FloatArray
+    targets: npt.NDArray[np.int32]
+    ends: IndexArray
+
+
+def dijkstra(problem: Problem, lattice: Lattice | None = None) -> Outcome:
+    """Return the shortest path in the graph of a lattice; without one, of the finest of a few that fits into memory."""
     no_plan = obvious_infeasibility(problem, NAME)
     if no_plan is not None:
         return no_plan
-    path = lattice_path(problem, cells or Cells())
-    if path is None:
-        return NoPlan(NAME, Infeasibility.UNREACHABLE)
-    start_deg = path.angles_deg[0] if problem.start_angle_deg is None else problem.start_angle_deg
-    start_speed = path.speeds_deg_s[0] if problem.start_speed_deg_s is None else problem.start_speed_deg_s
-    angles, speeds = roll_out(float(start_deg), float(start_speed), path.accelerations_deg_s2, problem.step_s)
-    return make_plan(problem, NAME, angles, speeds, path.accelerations_deg_s2)
+    lattice = lattice or _lattice_that_fits(problem)
+    path = None if lattice is None else shortest_path(problem, lattice)
+    return NoPlan(NAME, Infeasibility.NOT_FOUND) if path is None else make_plan(problem, NAME, *path.motion)
 
 
-def lattice_path(problem: Problem, cells: Cells) -> LatticePath | None:
-    """Return the shortest path in the graph of Eq. (8); None where there is none."""
-    accelerations = np.linspace(-1.0, 1.0, cells.acceleration_count) * problem.limits.acceleration_deg_s2
-    costs, targets, used, row_ends = _edges(problem.terms, cells, accelerations, _offset(problem))
-    sources = _start_nodes(problem, cells)
-    graph = _graph_with_source(costs, targets, row_ends, sources)
+def _lattice_that_fits(problem: Problem) -> Lattice | None:
+    lattices = (turn_lattice(problem, count, MOST_EDGES // problem.step_count) for count in SPEED_COUNTS)
+    return next((lattice for lattice in lattices if lattice is not None), None)
+
+
+def shortest_path(problem: Problem, lattice: Lattice) -> ShortestPath | None:
+    """Return the shortest path in the graph of a lattice around the turn; None where there is none."""
+    # The library takes an edge of length 0 for none. All paths have n edges, so an offset changes nothing.
+    offset = problem.greatest_step_cost
+    edges = _edges(problem.terms, lattice, offset)
+    graph = _graph_with_source(edges, _start_nodes(problem, lattice))
     source = [graph.shape[0] - 1]
     (distances,), (predecessors,) = shortest_paths(graph, indices=source, return_predecessors=True)
-    layer = cells.angle_count * cells.speed_count
+    layer = (2 * lattice.half_count + 1) * lattice.q_count
     end = layer * problem.step_count + int(np.argmin(distances[layer * problem.step_count : -1]))
     if not np.isfinite(distances[end]):
         return None
     nodes = [end]
     while nodes[-1] >= layer:
         nodes.append(int(predecessors[nodes[-1]]))
-    path = np.array(nodes[::-1])
-    edges = [_edge(costs, targets, row_ends, a, b) for a, b in pairwise(path)]
-    speeds = (path % layer // cells.angle_count - cells.speed_count // 2) * _speed_step(problem, cells)
-    wrapped_deg = (path % cells.angle_count) * (360.0 / cells.angle_count)
-    chosen = accelerations[used[edges]]
-    angles = wrapped_deg.copy()
-    for k, acceleration in enumerate(chosen):
-        unsnapped_deg = next_angle(float(angles[k]), float(speeds[k]), float(acceleration), problem.step_s)
-        angles[k + 1] += 360.0 * round((unsnapped_deg - angles[k + 1]) / 360.0)
-    return LatticePath(angles, speeds, chosen, float((costs[edges] - _offset(problem)).sum()))
+    path = np.array(nodes[::-1]) % layer
+    speeds = path // lattice.q_count - lattice.half_count
+    motion = motion_along(lattice, int(path[0] % lattice.q_count), speeds, problem.step_s)
+    return ShortestPath(motion, float(distances[end] - 1.0 - offset * problem.step_count))
 
 
-def _speed_step(problem: Problem, cells: Cells) -> float:
-    return 2.0 * problem.limits.speed_deg_s / (cells.speed_count - 1)
-
-
-def _offset(problem: Problem) -> float:
-    """Return what is added to each edge: the library takes an edge of cost 0 for none. All paths have n edges."""
-    return problem.greatest_step_cost
-
-
-def _start_nodes(problem: Problem, cells: Cells) -> IndexArray:
+def _start_nodes(problem: Problem, lattice: Lattice) -> IndexArray:
     """Return the nodes of column 0 that a path may start from."""
-    step_deg = 360.0 / cells.angle_count
-    angles = np.arange(cells.angle_count)
-    if problem.start_angle_deg is not None:
-        angles = np.array([int(np.floor(problem.start_angle_deg / step_deg + 0.5)) % cells.angle_count])
-    angles = angles[[problem.map.is_allowed(0, float(i * step_deg)) for i in angles]]
-    speeds = np.arange(cells.speed_count)
+    speeds = np.arange(-lattice.half_count, lattice.half_count + 1)
+    i, q = np.meshgrid(speeds, np.arange(lattice.q_count), indexing="ij")
+    is_start = np.ones(i.shape, dtype=np.bool_)
     if problem.start_speed_deg_s is not None:
-        index = np.floor(problem.start_speed_deg_s / _speed_step(problem, cells) + 0.5)
-        speeds = np.array([int(index) + cells.speed_count // 2])
-    return (speeds[:, None] * cells.angle_count + angles[None, :]).ravel()
+        is_start &= i == 0
+    if problem.start_angle_deg is not None:
+        is_start &= (2 * q + i) % (2 * lattice.q_count) == 0
+    return np.flatnonzero(is_start)
 
 
-def _graph_with_source(
-    costs: FloatArray, targets: npt.NDArray[np.int32], row_ends: IndexArray, sources: IndexArray
-) -> csr_array:
-    """Return the graph with one more node, the last, from which all starts are one edge of cost 1 away."""
-    count = len(row_ends)
-    data = np.concatenate((costs, np.ones(len(sources))))
-    indices = np.concatenate((targets, sources.astype(np.int32)))
-    pointers = np.concatenate(([0], row_ends, [len(data)]))
+def _graph_with_source(edges: Edges, sources: IndexArray) -> csr_array:
+    """Return the graph with one more node, the last, from which all starts are one edge of length 1 away."""
+    count = len(edges.ends)
+    data = np.concatenate((edges.lengths, np.ones(len(sources))))
+    indices = np.concatenate((edges.targets, sources.astype(np.int32)))
+    pointers = np.concatenate(([0], edges.ends, [len(data)]))
     return csr_array((data, indices, pointers), shape=(count + 1, count + 1))
 
 
-def _edge(costs: FloatArray, targets: npt.NDArray[np.int32], row_ends: IndexArray, source: int, target: int) -> int:
-    """Return the cheapest edge between two nodes."""
-    first, last = (0 if source == 0 else int(row_ends[source - 1])), int(row_ends[source])
-    parallel = first + np.flatnonzero(targets[first:last] == target)
-    return int(parallel[np.argmin(costs[parallel])])
-
-
 @kernel
-def _edges(
-    terms: Terms, cells: Cells, accelerations: FloatArray, offset: float
-) -> tuple[FloatArray, npt.NDArray[np.int32], npt.NDArray[np.int8], IndexArray]:
-    """Return the edges of all nodes in turn: cost, target, index of the acceleration; and where each node's end."""
-    steps, layer = len(terms.values) - 1, cells.angle_count * cells.speed_count
-    step_deg = 360.0 / cells.angle_count
-    half, speed_step = cells.speed_count // 2, 2.0 * terms.speed_limit_deg_s / (cells.speed_count - 1)
-    capacity = steps * layer * len(accelerations)
-    costs, targets = np.empty(capacity), np.empty(capacity, dtype=np.int32)
-    used, row_ends = np.empty(capacity, dtype=np.int8), np.empty((steps + 1) * layer, dtype=np.int64)
-    count = 0
-    for node in range((steps + 1) * layer):
-        k, j, i = node // layer, node % layer // cells.angle_count, node % cells.angle_count
-        if k < steps and column_value(terms.values, terms.epsilon, k, i * step_deg) > terms.epsilon:
-            for a in range(len(accelerations)):
-                speed = next_speed((j - half) * speed_step, accelerations[a], terms.step_s)
-                angle = next_angle(i * step_deg, (j - half) * speed_step, accelerations[a], terms.step_s)
-                speed_cell = int(np.floor(speed / speed_step + 0.5)) + half
-                angle_cell = int(np.floor(angle / step_deg + 0.5 + 1e-9)) % cells.angle_count
-                value = column_value(terms.values, terms.epsilon, k + 1, angle_cell * step_deg)
-                if not 0 <= speed_cell < cells.speed_count or value <= terms.epsilon:
-                    continue
-                if not step_is_allowed(
-                    terms.runs, k, i * step_deg, (j - half) * speed_step, accelerations[a], terms.step_s
-                ):
-                    continue
-                costs[count] = offset + acceleration_cost(terms.acceleration_weight, accelerations[a])
-                costs[count] += speed_cost(terms.speed_weight, speed) + value_cost(value)
-                targets[count] = (k + 1) * layer + speed_cell * cells.angle_count + angle_cell
-                used[count] = a
-                count += 1
-        row_ends[node] = count
-    return costs[:count], targets[:count], used[:count], row_ends
+def _edges(terms: Terms, lattice: Lattice, offset: float) -> Edges:
+    """Return the edges: the steps of the lattice that the crossing rule allows."""
+    steps, half, count = len(terms.values) - 1, lattice.half_count, lattice.q_count
+    speeds = 2 * half + 1
+    unit, reference = speed_unit(lattice, terms.step_s), lattice.reference
+    capacity = 0
+    for k in range(steps):
+        for i in range(-half, half + 1):
+            first, last = steps_from(terms, lattice, k, i)
+            capacity += max(0, last - first + 1) * count
+    lengths, targets = np.empty(capacity), np.empty(capacity, dtype=np.int32)
+    ends = np.empty((steps + 1) * speeds * count, dtype=np.int64)
+    found = 0
+    for node in range(len(ends)):
+        k, i, q = node // (speeds * count), node // count % speeds - half, node % count
+        first, last = steps_from(terms, lattice, k, i) if k < steps else (1, 0)
+        for j in range(first, last + 1):
+            angle = reference.angles_deg[k] + (2 * q + i) * lattice.node_deg
+            acceleration = reference.accelerations_deg_s2[k] + (j - i) * unit / terms.step_s
+            speed = reference.speeds_deg_s[k] + i * unit
+            if not step_is_allowed(terms.runs, k, angle, speed, acceleration, terms.step_s):
+                continue
+            end = reference.angles_deg[k + 1] + (2 * (q + i) + j) * lattice.node_deg
+            lengths[found] = offset + acceleration_cost(terms.acceleration_weight, acceleration)
+            lengths[found] += speed_cost(terms.speed_weight, reference.speeds_deg_s[k + 1] + j * unit)
+            lengths[found] += value_cost(column_value(terms.values, terms.epsilon, k + 1, end))
+            targets[found] = ((k + 1) * speeds + j + half) * count + wrapped(q + i, count)
+            found += 1
+        ends[node] = found
+    return Edges(lengths[:found], targets[:found], ends)

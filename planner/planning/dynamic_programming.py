@@ -4,13 +4,15 @@ Where the lattice has no way, finer means take turns: a proof that there is none
 and a finer lattice. Each turn doubles the speeds that they use.
 """
 
+from typing import NamedTuple
+
 from planner.planning.crossable_intervals import crossing_motion
 from planner.planning.interpolated_planner import interpolated_plan
 from planner.planning.iterative_dynamic_programming import best_around, refine, tube
 from planner.planning.lattice import Lattice
-from planner.planning.lattice_choice import limits_rounded_up, turn_lattice, with_limits_rounded_up
+from planner.planning.lattice_choice import EXACTLY, NEARLY, limits_rounded_up, turn_lattice, with_limits_rounded_up
 from planner.planning.lattice_search import best_motion
-from planner.planning.plan import Infeasibility, NoPlan, Outcome, Plan, make_plan, motion_of, obvious_infeasibility
+from planner.planning.plan import Infeasibility, NoPlan, Outcome, Plan, make_plan, obvious_infeasibility
 from planner.planning.problem import Problem
 from planner.planning.unreachability_proof import first_unreachable_location
 from planner.planning.verification import verify
@@ -24,12 +26,32 @@ WORK_PER_SAMPLE = 1_300
 # The tube around a path that exceeds the limits.
 WIDE_SPEEDS_EACH_WAY, WIDE_Q_COUNT = 8, 48
 
-# Where that has no way: how often finer means are tried, and where they begin.
-TURNS = 5
-FINE_WORK_PER_SAMPLE = 20_000
-FINE_SPEED_COUNT = 20
-CELLS = 16
-SPEEDS_PER_GAIN = 4
+
+class Effort(NamedTuple):
+    """How hard to search where the first lattice has no way.
+
+    Attributes:
+        cells: cells of speed for the proof.
+        speeds_per_gain: speeds of the crossable intervals.
+        speed_count: speeds each way of the lattice.
+        share: of the greatest speed that the lattice must have.
+        work_per_sample: steps of the lattice per sample of a column, at most.
+    """
+
+    cells: int
+    speeds_per_gain: int
+    speed_count: int
+    share: float
+    work_per_sample: int
+
+
+EFFORTS = (
+    Effort(32, 4, 20, NEARLY, 20_000),
+    Effort(64, 8, 20, EXACTLY, 100_000),
+    Effort(128, 16, 40, NEARLY, 100_000),
+    Effort(256, 32, 40, EXACTLY, 200_000),
+    Effort(512, 64, 60, NEARLY, 200_000),
+)
 
 
 def dynamic_programming(problem: Problem) -> Outcome:
@@ -79,26 +101,31 @@ def lattice_plan(problem: Problem, lattice: Lattice) -> Plan | None:
 
 
 def search_harder(problem: Problem) -> Outcome:
-    """Return a plan or the proof that there is none, by finer and finer means."""
-    for turn in range(TURNS):
-        location = first_unreachable_location(problem, CELLS << turn)
+    """Return a plan, or the proof that there is none, by finer and finer means."""
+    for effort in EFFORTS:
+        location = first_unreachable_location(problem, effort.cells)
         if location is not None:
             return NoPlan(NAME, Infeasibility.UNREACHABLE, location)
-        motion = crossing_motion(problem, SPEEDS_PER_GAIN << turn)
-        fine = turn_lattice(problem, FINE_SPEED_COUNT << turn, (FINE_WORK_PER_SAMPLE << turn) * problem.map.angle_count)
-        plans = []
-        if motion is not None:
-            plans.append(_improved(problem, make_plan(problem, NAME, *motion)))
-        if fine is not None and (plan := lattice_plan(problem, fine)) is not None:
-            plans.append(plan)
-        if plans:
-            return min(plans, key=lambda plan: plan.cost.total)
+        plans = [_plan_through_intervals(problem, effort), _plan_on_finer_lattice(problem, effort)]
+        found = [plan for plan in plans if plan is not None]
+        if found:
+            return min(found, key=lambda plan: plan.cost.total)
     return NoPlan(NAME, Infeasibility.NOT_FOUND)
 
 
-def _improved(problem: Problem, plan: Plan) -> Plan:
-    """Return a plan that only avoids the forbidden regions, made good: first anywhere on the map, then nearby."""
-    around = turn_lattice(problem, SPEED_COUNT, WORK_PER_SAMPLE * problem.map.angle_count, motion_of(plan))
+def _plan_on_finer_lattice(problem: Problem, effort: Effort) -> Plan | None:
+    work = effort.work_per_sample * problem.map.angle_count
+    lattice = turn_lattice(problem, effort.speed_count, work, share=effort.share)
+    return None if lattice is None else lattice_plan(problem, lattice)
+
+
+def _plan_through_intervals(problem: Problem, effort: Effort) -> Plan | None:
+    """Return a plan through the crossable intervals, made good: first anywhere on the map, then nearby."""
+    motion = crossing_motion(problem, effort.speeds_per_gain)
+    if motion is None:
+        return None
+    plan = make_plan(problem, NAME, *motion)
+    around = turn_lattice(problem, SPEED_COUNT, WORK_PER_SAMPLE * problem.map.angle_count, reference=motion)
     if around is None:
         return refine(problem, plan, 0.25 * problem.map.angle_step_deg)
     return refine(problem, best_around(problem, plan, around), 0.5 * around.node_deg)

@@ -41,7 +41,7 @@ class Lattice(NamedTuple):
         half_count: i runs from -half_count to half_count.
         first_q: the first q.
         q_count: how many q there are.
-        is_closed: whether q goes around the turn, in `q_count` steps; if not, the lattice is a tube around the reference.
+        is_closed: whether q goes around the turn in `q_count` steps; if not, this is a tube around the reference.
     """
 
     reference: Motion
@@ -83,6 +83,17 @@ def speed_unit(lattice: Lattice, step_s: float) -> float:
     return 2.0 * lattice.node_deg / step_s
 
 
+def motion_along(lattice: Lattice, q: int, speeds: IndexArray, step_s: float) -> Motion:
+    """Return the motion of a path: it starts at q, and has speed i at each column."""
+    qs = q + np.concatenate(([0], np.cumsum(speeds[:-1])))
+    unit, reference = speed_unit(lattice, step_s), lattice.reference
+    return Motion(
+        reference.angles_deg + (2 * qs + speeds) * lattice.node_deg,
+        reference.speeds_deg_s + speeds * unit,
+        reference.accelerations_deg_s2 + np.diff(speeds) * unit / step_s,
+    )
+
+
 @kernel
 def cost_unit(terms: Terms) -> float:
     """Return the greatest cost of a step: costs are counted in it, so that any weights fit into single precision."""
@@ -112,7 +123,10 @@ def make_rows(lattice: Lattice) -> StepRows:
 
 @kernel
 def lay_out_step(terms: Terms, lattice: Lattice, column: int, rows: StepRows) -> None:
-    """Write what the step from `column` to the next needs to know of its nodes; columns go from the last to the first."""
+    """Write what the step from `column` to the next needs to know of its nodes.
+
+    Columns must come from the last to the first: the nodes' samples are kept from one to the next.
+    """
     angles_deg, samples_per_deg = lattice.reference.angles_deg, terms.values.shape[1] / 360.0
     nodes_per_sample = 1.0 / (samples_per_deg * lattice.node_deg)
     moved = (angles_deg[column + 1] - angles_deg[column]) / lattice.node_deg

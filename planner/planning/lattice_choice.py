@@ -11,25 +11,28 @@ from planner.table.motion import Limits, Motion
 # A rounding error below this does not lose a speed.
 ROUNDING = 1e-9
 
-# Share of the greatest speed that a speed of the lattice must reach.
-NEARLY = 0.97
+# Share of the greatest speed that a speed of the lattice must reach: nearly all of it, or all of it.
+NEARLY, EXACTLY = 0.97, 1.0 - ROUNDING
 
 # 200 MB.
 MOST_STATES = 50_000_000
 
 
-def turn_lattice(problem: Problem, speed_count: int, work: int, reference: Motion | None = None) -> Lattice | None:
+def turn_lattice(
+    problem: Problem, speed_count: int, work: int, reference: Motion | None = None, share: float = NEARLY
+) -> Lattice | None:
     """Return the coarsest lattice around the turn with at least so many speeds each way; None where all are too large.
 
     Its nodes at rest are the samples of the map, a multiple of them, or, where samples are closer than needed, every
-    second, third .. sample. Its greatest speed is nearly the greatest that can occur, and the acceleration limit lies
-    at least two speeds away, or one where two are too many for `work`.
+    second, third .. sample. The acceleration limit lies at least two speeds away, or one where two are too many
+    for `work`.
 
     Args:
         problem: what is to be crossed.
         speed_count: speeds each way, at least.
         work: steps per column, at most.
         reference: motion to lay the lattice around; without one, that of `reference_motion`.
+        share: of the greatest speed that can occur, at least so much is a speed.
     """
     motion = reference_motion(problem) if reference is None else reference
     for least_reach in (2, 1):
@@ -42,8 +45,8 @@ def turn_lattice(problem: Problem, speed_count: int, work: int, reference: Motio
                 break
             if rests * speeds * problem.map.location_count > MOST_STATES:
                 break
-            nearly = half_count * unit_deg_s >= NEARLY * problem.attainable_speed_deg_s
-            if half_count >= speed_count and reach >= least_reach and nearly:
+            reaches = half_count * unit_deg_s >= share * problem.attainable_speed_deg_s
+            if half_count >= speed_count and reach >= least_reach and reaches:
                 return Lattice(motion, 180.0 / rests, half_count, 0, rests, is_closed=True)
     return None
 

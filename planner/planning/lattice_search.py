@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from planner.arrays import CostArray
+from planner.arrays import CostArray, IndexArray
 from planner.kernel import kernel
 from planner.map.config_map import column_value, wrapped
 from planner.planning.crossing import step_is_allowed
-from planner.planning.lattice import ANY_COST, UNREACHABLE, Lattice, cost_unit, speed_unit
+from planner.planning.lattice import ANY_COST, UNREACHABLE, Lattice, cost_unit, motion_along, speed_unit
 from planner.planning.lattice_cost_to_go import cost_to_go, steps_from
 from planner.planning.problem import Problem, Terms
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
@@ -30,8 +30,8 @@ def best_motion(problem: Problem, lattice: Lattice, limits: Limits | None = None
     q, i = _best_start(costs[0], lattice, problem.start_angle_deg is None, problem.start_speed_deg_s is None)
     if costs[0, i + lattice.half_count, (q - lattice.first_q) % lattice.q_count] >= ANY_COST:
         return None
-    motion = follow(terms, lattice, costs, q, i)
-    return motion if np.isfinite(motion.speeds_deg_s[-1]) else None
+    speeds = _follow(terms, lattice, costs, q, i)
+    return motion_along(lattice, q, speeds, problem.step_s) if len(speeds) == len(costs) else None
 
 
 @kernel
@@ -51,23 +51,16 @@ def _best_start(costs: CostArray, lattice: Lattice, angle_is_free: bool, speed_i
 
 
 @kernel
-def follow(terms: Terms, lattice: Lattice, costs: CostArray, q: int, i: int) -> Motion:
-    """Return the best motion from a state of column 0 that has a way on; NaN from where it should have none."""
-    reference, unit = lattice.reference, speed_unit(lattice, terms.step_s)
-    angles, speeds = reference.angles_deg.copy(), reference.speeds_deg_s.copy()
-    accelerations = reference.accelerations_deg_s2.copy()
-    angles[0] += (2 * q + i) * lattice.node_deg
-    speeds[0] += i * unit
-    for k in range(len(accelerations)):
-        j = _best_step(terms, lattice, costs, k, q, i)
-        if j > lattice.half_count:
-            speeds[k + 1 :] = np.nan
-            break
-        q, jump, i = q + i, j - i, j
-        angles[k + 1] += (2 * q + i) * lattice.node_deg
-        speeds[k + 1] += i * unit
-        accelerations[k] += jump * unit / terms.step_s
-    return Motion(angles, speeds, accelerations)
+def _follow(terms: Terms, lattice: Lattice, costs: CostArray, q: int, i: int) -> IndexArray:
+    """Return the speeds of the best path from a state of column 0; fewer where no step goes on."""
+    speeds = np.empty(len(costs), dtype=np.int64)
+    speeds[0] = i
+    for k in range(len(costs) - 1):
+        speeds[k + 1] = _best_step(terms, lattice, costs, k, q, speeds[k])
+        if speeds[k + 1] > lattice.half_count:
+            return speeds[: k + 1]
+        q += speeds[k]
+    return speeds
 
 
 @kernel

@@ -10,6 +10,9 @@ from planner.errors import PlannerError
 from planner.map.config_map import SAMPLE_TOLERANCE
 from planner.planning.problem import Problem
 
+# From so many samples over one turn on, angles between them gain nothing.
+CLOSE_SAMPLES = 720
+
 
 class GridError(PlannerError):
     """A grid that does not fit into memory."""
@@ -52,7 +55,7 @@ def ladder(reach: int, count: int) -> IndexArray:
 
 
 def default_grid(
-    problem: Problem, refinement: int = 2, speed_count: int = 61, jump_count: int = 15, least_reach: int = 4
+    problem: Problem, refinement: int | None = None, speed_count: int = 61, jump_count: int = 15, least_reach: int = 4
 ) -> Grid:
     """Return a grid that has the full acceleration among its jumps.
 
@@ -61,11 +64,13 @@ def default_grid(
 
     Args:
         problem: what is to be crossed.
-        refinement: angles of the grid per sample of the map.
+        refinement: angles of the grid per sample of the map; without it two, or one where the samples are close.
         speed_count: speeds, about.
         jump_count: changes of speed per step, at most.
         least_reach: speed steps within the acceleration limit, at least.
     """
+    if refinement is None:
+        refinement = 2 if problem.map.angle_count <= CLOSE_SAMPLES else 1
     angle_count = problem.map.angle_count * refinement
     half = (speed_count - 1) // 2
     gain_deg_s = problem.limits.acceleration_deg_s2 * problem.step_s

@@ -7,80 +7,126 @@ rounded outwards, by far more than what a plan may deviate. So where all of them
 need not hold, since the cells forget which speed belongs to which angle. Smaller cells forget less.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.kernel import kernel
 from planner.planning.crossable_intervals import runs_of
 from planner.planning.interval_union import unite
 from planner.planning.problem import Problem, Terms
+from planner.planning.verification import ROUNDING
 
-# By how much limits (relative) and runs and ways (in samples) are widened; plans keep them within 1e-9.
+# By how much limits (relative, and what a verified plan may exceed) and runs and ways (in samples) are widened.
 LIMIT_MARGIN = 1e-7
 SAMPLE_MARGIN = 1e-6
 
+# How many times smaller cells name the location, once there is a proof.
+FINER = 4
+
+
+class Reachable(NamedTuple):
+    """Angles that can be reached in a column, in samples, per cell of speed.
+
+    Attributes:
+        slowest: bound of the speeds.
+        fastest: bound of the speeds.
+        interval_count: (n_cells,) intervals of each cell.
+        lows: (n_cells, room) their lower ends.
+        highs: (n_cells, room) their upper ends.
+    """
+
+    slowest: float
+    fastest: float
+    interval_count: IndexArray
+    lows: FloatArray
+    highs: FloatArray
+
+
+class Widening(NamedTuple):
+    """What steps from one cell to another do, in samples.
+
+    Attributes:
+        least: the angle moved, at least.
+        most: the angle moved, at most.
+        beyond_start: how far beyond its start each of them turns back, at least; upwards if positive.
+        beyond_end: the same, beyond its end.
+    """
+
+    least: float
+    most: float
+    beyond_start: float
+    beyond_end: float
+
 
 def first_unreachable_location(problem: Problem, cell_count: int) -> int | None:
-    """Return the first location that no motion from the start reaches, if that can be proved with so many cells.
+    """Return the first location that no motion from the start reaches; None without a proof.
 
     Args:
         problem: what is to be crossed; a free start means all angles, or all speeds.
-        cell_count: cells of speed.
+        cell_count: cells of speed for the proof; the location is named with smaller ones.
     """
-    limit = problem.limits.speed_deg_s * (1.0 + LIMIT_MARGIN)
+    if _first_empty_column(problem, cell_count) is None:
+        return None
+    return _first_empty_column(problem, FINER * cell_count)
+
+
+def _first_empty_column(problem: Problem, cell_count: int) -> int | None:
+    limit = problem.limits.speed_deg_s * (1.0 + LIMIT_MARGIN) + ROUNDING
     edges = np.linspace(-limit, limit, cell_count + 1)
-    speeds = (-limit, limit) if problem.start_speed_deg_s is None else (problem.start_speed_deg_s,) * 2
-    angle = problem.start_angle_deg
+    slowest, fastest = (-limit, limit) if problem.start_speed_deg_s is None else (problem.start_speed_deg_s,) * 2
     turn = float(problem.map.angle_count)
-    low = 0.0 if angle is None else angle * turn / 360.0 % turn
-    reach = turn if angle is None else 0.0
-    location = _first_empty(problem.terms, edges, float(speeds[0]), float(speeds[1]), low, reach)
-    return location if location >= 0 else None
+    low = 0.0 if problem.start_angle_deg is None else problem.start_angle_deg * turn / 360.0 % turn
+    high = turn if problem.start_angle_deg is None else low
+    start = Reachable(
+        float(slowest),
+        float(fastest),
+        ((edges[:-1] <= fastest) & (edges[1:] >= slowest)).astype(np.int64),
+        np.full((cell_count, 1), low),
+        np.full((cell_count, 1), high),
+    )
+    column = _first_empty(problem.terms, edges, start)
+    return column if column >= 0 else None
 
 
 @kernel
-def _first_empty(terms: Terms, edges: FloatArray, slowest: float, fastest: float, start: float, length: float) -> int:
-    """Return the first column in which no state is left; -1 where some are left in all."""
-    steps, turn = len(terms.values) - 1, float(terms.values.shape[1])
-    gain = terms.acceleration_limit_deg_s2 * terms.step_s * (1.0 + LIMIT_MARGIN)
-    cells = len(edges) - 1
-    count, later_count = np.zeros(cells, dtype=np.int64), np.zeros(cells, dtype=np.int64)
-    lows, highs = np.empty((cells, 8)), np.empty((cells, 8))
-    later_lows, later_highs = np.empty((cells, 8)), np.empty((cells, 8))
-    for c in range(cells):
-        if edges[c] <= fastest + LIMIT_MARGIN and edges[c + 1] >= slowest - LIMIT_MARGIN:
-            count[c], lows[c, 0], highs[c, 0] = 1, start, start + length
-    room = 1024
+def _first_empty(terms: Terms, edges: FloatArray, start: Reachable) -> int:
+    """Return the first column in which nothing can be reached; -1 where something can in all."""
+    reachable = start
+    for k in range(len(terms.values) - 1):
+        reachable = _step(terms, edges, k, reachable)
+        if reachable.interval_count.max() == 0:
+            return k + 1
+    return -1
+
+
+@kernel
+def _step(terms: Terms, edges: FloatArray, column: int, now: Reachable) -> Reachable:
+    """Return what can be reached in the next column."""
+    turn, cells = float(terms.values.shape[1]), len(edges) - 1
+    gain = (terms.acceleration_limit_deg_s2 * (1.0 + LIMIT_MARGIN) + ROUNDING) * terms.step_s
+    scale = 0.5 * terms.step_s * turn / 360.0
+    slowest, fastest = max(now.slowest - gain, edges[0]), min(now.fastest + gain, edges[-1])
+    run_lows, run_highs = runs_of(terms.runs, column)
+    count = np.zeros(cells, dtype=np.int64)
+    lows, highs = np.empty((cells, now.lows.shape[1])), np.empty((cells, now.lows.shape[1]))
+    # Of disjoint intervals and disjoint runs, few pairs meet twice around the turn.
+    room = 4 * now.interval_count.sum() * (len(run_lows) + 1)
     piece_lows, piece_highs = np.empty(room), np.empty(room)
-    for k in range(steps):
-        run_lows, run_highs = runs_of(terms.runs, k)
-        left = False
-        for d in range(cells):
-            later_slowest = max(edges[d], slowest - gain)
-            later_fastest = min(edges[d + 1], fastest + gain)
-            pieces = 0
-            for c in range(cells):
-                if count[c] == 0 or later_slowest > later_fastest:
-                    continue
-                low, high = max(edges[c], slowest), min(edges[c + 1], fastest)
-                if later_slowest > high + gain or later_fastest < low - gain or low > high:
-                    continue
-                least = max(low, later_slowest - gain) + max(later_slowest, low - gain)
-                most = min(high, later_fastest + gain) + min(later_fastest, high + gain)
-                scale = 0.5 * terms.step_s * turn / 360.0
-                need = pieces + 2 * count[c] * (len(run_lows) + 2) * (3 + int((most - least) * scale / turn))
-                if need > len(piece_lows):
-                    piece_lows = np.concatenate((piece_lows, np.empty(need)))
-                    piece_highs = np.concatenate((piece_highs, np.empty(need)))
-                beyond = _least_turn(low, high, later_slowest, later_fastest) * scale
-                before = _least_turn(-later_fastest, -later_slowest, -high, -low) * scale
-                pieces = _step(
-                    beyond,
-                    before,
-                    least * scale - SAMPLE_MARGIN,
-                    most * scale + SAMPLE_MARGIN,
-                    lows[c, : count[c]],
-                    highs[c, : count[c]],
+    for later in range(cells):
+        later_low, later_high = max(edges[later], slowest), min(edges[later + 1], fastest)
+        pieces = 0
+        for c in range(cells):
+            low, high = max(edges[c], now.slowest), min(edges[c + 1], now.fastest)
+            if low > high or later_low > later_high or later_low > high + gain or later_high < low - gain:
+                continue
+            widening = _widening(low, high, later_low, later_high, gain, scale)
+            for i in range(now.interval_count[c]):
+                pieces = _widen(
+                    widening,
+                    now.lows[c, i],
+                    now.highs[c, i],
                     run_lows,
                     run_highs,
                     turn,
@@ -88,22 +134,24 @@ def _first_empty(terms: Terms, edges: FloatArray, slowest: float, fastest: float
                     piece_highs,
                     pieces,
                 )
-            pieces = unite(piece_lows, piece_highs, pieces, turn)
-            if pieces > later_lows.shape[1]:
-                later_lows = _wider(later_lows, 2 * pieces)
-                later_highs = _wider(later_highs, 2 * pieces)
-            later_lows[d, :pieces], later_highs[d, :pieces] = piece_lows[:pieces], piece_highs[:pieces]
-            later_count[d] = pieces
-            left = left or pieces > 0
-        if not left:
-            return k + 1
-        lows, later_lows = later_lows, lows
-        highs, later_highs = later_highs, highs
-        count, later_count = later_count, count
-        if later_lows.shape[1] < lows.shape[1]:
-            later_lows, later_highs = np.empty(lows.shape), np.empty(lows.shape)
-        slowest, fastest = max(slowest - gain, edges[0]), min(fastest + gain, edges[-1])
-    return -1
+        pieces = unite(piece_lows, piece_highs, pieces, turn)
+        if pieces > lows.shape[1]:
+            lows, highs = _with_more_room(lows, 2 * pieces), _with_more_room(highs, 2 * pieces)
+        lows[later, :pieces], highs[later, :pieces], count[later] = piece_lows[:pieces], piece_highs[:pieces], pieces
+    return Reachable(slowest, fastest, count, lows, highs)
+
+
+@kernel
+def _widening(low: float, high: float, later_low: float, later_high: float, gain: float, scale: float) -> Widening:
+    """Return what the steps do from a speed of one cell to a speed of another that is at most `gain` away."""
+    least = max(low, later_low - gain) + max(later_low, low - gain)
+    most = min(high, later_high + gain) + min(later_high, high + gain)
+    return Widening(
+        least * scale - SAMPLE_MARGIN,
+        most * scale + SAMPLE_MARGIN,
+        _least_turn(low, high, later_low, later_high) * scale,
+        _least_turn(-later_high, -later_low, -high, -low) * scale,
+    )
 
 
 @kernel
@@ -117,20 +165,17 @@ def _least_turn(low: float, high: float, later_low: float, later_high: float) ->
 
 
 @kernel
-def _wider(array: FloatArray, width: int) -> FloatArray:
-    wider = np.empty((len(array), width))
-    wider[:, : array.shape[1]] = array
-    return wider
+def _with_more_room(array: FloatArray, room: int) -> FloatArray:
+    larger = np.empty((len(array), room))
+    larger[:, : array.shape[1]] = array
+    return larger
 
 
 @kernel
-def _step(
-    beyond: float,
-    before: float,
-    least: float,
-    most: float,
-    lows: FloatArray,
-    highs: FloatArray,
+def _widen(
+    widening: Widening,
+    low: float,
+    high: float,
     run_lows: FloatArray,
     run_highs: FloatArray,
     turn: float,
@@ -138,28 +183,27 @@ def _step(
     piece_highs: FloatArray,
     pieces: int,
 ) -> int:
-    """Append the angles to which steps that move between `least` and `most` lead from given intervals."""
-    whole = len(run_lows) > 0 and run_highs[0] - run_lows[0] >= turn
-    for i in range(len(lows)):
-        for r in range(len(run_lows)):
-            run_low, run_high = run_lows[r] - SAMPLE_MARGIN, run_highs[r] + SAMPLE_MARGIN
-            turned = 0.0 if whole else turn * np.ceil((lows[i] - run_high) / turn)
-            while whole or run_low + turned <= highs[i]:
-                if whole:
-                    low, high = lows[i] + least, highs[i] + most
-                else:
-                    low = max(lows[i], run_low + turned + max(-beyond, 0.0))
-                    high = min(highs[i], run_high + turned - max(beyond, 0.0))
-                    if low > high:
-                        turned += turn
-                        continue
-                    low = max(low + least, run_low + turned + max(-before, 0.0))
-                    high = min(high + most, run_high + turned - max(before, 0.0))
-                if low <= high:
-                    back = turn * np.floor(low / turn)
-                    piece_lows[pieces], piece_highs[pieces] = low - back, high - back
-                    pieces += 1
-                if whole:
-                    break
-                turned += turn
+    """Append to what angles steps lead from an interval; return the new number of pieces."""
+    if len(run_lows) == 1 and run_highs[0] - run_lows[0] >= turn:
+        return _append(low + widening.least, high + widening.most, turn, piece_lows, piece_highs, pieces)
+    above_start, below_start = max(widening.beyond_start, 0.0), max(-widening.beyond_start, 0.0)
+    above_end, below_end = max(widening.beyond_end, 0.0), max(-widening.beyond_end, 0.0)
+    for r in range(len(run_lows)):
+        run_low, run_high = run_lows[r] - SAMPLE_MARGIN, run_highs[r] + SAMPLE_MARGIN
+        turned = turn * np.ceil((low - run_high) / turn)
+        while run_low + turned <= high:
+            start_low, start_high = max(low, run_low + turned + below_start), min(high, run_high + turned - above_start)
+            end_low = max(start_low + widening.least, run_low + turned + below_end)
+            end_high = min(start_high + widening.most, run_high + turned - above_end)
+            if start_low <= start_high and end_low <= end_high:
+                pieces = _append(end_low, end_high, turn, piece_lows, piece_highs, pieces)
+            turned += turn
     return pieces
+
+
+@kernel
+def _append(low: float, high: float, turn: float, piece_lows: FloatArray, piece_highs: FloatArray, pieces: int) -> int:
+    """Append an interval, turned so that its lower end lies within 0 .. turn."""
+    back = turn * np.floor(low / turn)
+    piece_lows[pieces], piece_highs[pieces] = low - back, high - back
+    return pieces + 1
