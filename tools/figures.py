@@ -21,7 +21,8 @@ from planner.kinematics.value import joint_factor
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, blocks_map, synthetic_map
 from planner.planning.crossing import step_is_allowed
-from planner.planning.dijkstra import Cells, dijkstra
+from planner.planning.dijkstra import dijkstra
+from planner.planning.lattice_choice import turn_lattice
 from planner.planning.dynamic_programming import dynamic_programming
 from planner.planning.local_maxima import local_maxima
 from planner.planning.plan import Outcome, Plan
@@ -39,11 +40,11 @@ RAY_COLOUR = "#7fb2e5"
 JOINT_RANGE_DEG = (-170.0, 170.0)
 EXPONENTS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 
-# Fig. 6, 7 and 9 share one map. With these limits and cells each step of the graph ends exactly on a cell's centre, so
-# that the path in the graph is also what the table does.
+# Fig. 6, 7 and 9 share one map. Each step of the graph of Fig. 7 ends exactly on a node, so that the path in the graph
+# is also what the table does. It has 10 speeds each way, up to the limit itself.
 SHARED_FAMILY, SHARED_SEED = MapFamily(0.42, 6.0, 0.3), 11
 SHARED_STEP_S, SHARED_LIMITS = 0.5, Limits(36.0, 36.0)
-SHARED_CELLS = Cells(angle_count=400, speed_count=21, acceleration_count=11)
+SHARED_SPEED_COUNT, SHARED_WORK = 10, 100_000
 
 # Fig. 8: obstacles as (first location, last location, first angle, last angle), samples of 3 deg.
 OBSTACLES = [(26, 40, 56, 112), (56, 72, 18, 48)]
@@ -104,7 +105,9 @@ def figure_6() -> Figure:
 
 def figure_7() -> Figure:
     """Position, speed and acceleration of the path that Dijkstra's algorithm finds."""
-    return _motion_figure(dijkstra(shared_problem(), SHARED_CELLS), "Dijkstra's algorithm on the graph of Eq. (8)")
+    problem = shared_problem()
+    lattice = turn_lattice(problem, SHARED_SPEED_COUNT, SHARED_WORK)
+    return _motion_figure(dijkstra(problem, lattice), "Dijkstra's algorithm on the graph of Eq. (8)")
 
 
 def figure_8() -> Figure:

@@ -4,6 +4,7 @@ Where the lattice has no way, finer means take turns: a proof that there is none
 and a finer lattice. Each turn doubles the speeds that they use.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 from planner.planning.crossable_intervals import crossing_motion
@@ -19,9 +20,9 @@ from planner.planning.verification import verify
 
 NAME = "dynamic_programming"
 
-# Speeds each way of the lattice, and its steps per sample of a column.
+# Speeds each way of the lattice, at least, and its steps per column, at most.
 SPEED_COUNT = 8
-WORK_PER_SAMPLE = 1_300
+WORK = 130_000
 
 # The tube around a path that exceeds the limits.
 WIDE_SPEEDS_EACH_WAY, WIDE_Q_COUNT = 8, 48
@@ -35,22 +36,22 @@ class Effort(NamedTuple):
         speeds_per_gain: speeds of the crossable intervals.
         speed_count: speeds each way of the lattice.
         share: of the greatest speed that the lattice must have.
-        work_per_sample: steps of the lattice per sample of a column, at most.
+        work: steps of the lattice per column, at most.
     """
 
     cells: int
     speeds_per_gain: int
     speed_count: int
     share: float
-    work_per_sample: int
+    work: int
 
 
 EFFORTS = (
-    Effort(32, 4, 20, NEARLY, 20_000),
-    Effort(64, 8, 20, EXACTLY, 100_000),
-    Effort(128, 16, 40, NEARLY, 100_000),
-    Effort(256, 32, 40, EXACTLY, 200_000),
-    Effort(512, 64, 60, NEARLY, 200_000),
+    Effort(32, 4, 20, NEARLY, 2_000_000),
+    Effort(64, 8, 20, EXACTLY, 10_000_000),
+    Effort(128, 16, 40, NEARLY, 10_000_000),
+    Effort(256, 32, 40, EXACTLY, 20_000_000),
+    Effort(512, 64, 60, NEARLY, 20_000_000),
 )
 
 
@@ -68,11 +69,11 @@ def dynamic_programming(problem: Problem) -> Outcome:
 
 def first_plan(problem: Problem) -> Plan | None:
     """Return the best plan of the lattice that there is time for, refined; None where that has none."""
-    lattice = turn_lattice(problem, SPEED_COUNT, WORK_PER_SAMPLE * problem.map.angle_count)
+    lattice = turn_lattice(problem, SPEED_COUNT, WORK)
     if lattice is not None:
         return lattice_plan(problem, lattice)
     plan = interpolated_plan(problem)
-    return None if plan is None else refine(problem, plan, 0.25 * problem.map.angle_step_deg)
+    return None if plan is None else refine(problem, replace(plan, planner=NAME), 0.25 * problem.map.angle_step_deg)
 
 
 def lattice_plan(problem: Problem, lattice: Lattice) -> Plan | None:
@@ -114,8 +115,7 @@ def search_harder(problem: Problem) -> Outcome:
 
 
 def _plan_on_finer_lattice(problem: Problem, effort: Effort) -> Plan | None:
-    work = effort.work_per_sample * problem.map.angle_count
-    lattice = turn_lattice(problem, effort.speed_count, work, share=effort.share)
+    lattice = turn_lattice(problem, effort.speed_count, effort.work, share=effort.share)
     return None if lattice is None else lattice_plan(problem, lattice)
 
 
@@ -125,7 +125,7 @@ def _plan_through_intervals(problem: Problem, effort: Effort) -> Plan | None:
     if motion is None:
         return None
     plan = make_plan(problem, NAME, *motion)
-    around = turn_lattice(problem, SPEED_COUNT, WORK_PER_SAMPLE * problem.map.angle_count, reference=motion)
+    around = turn_lattice(problem, SPEED_COUNT, WORK, reference=motion)
     if around is None:
         return refine(problem, plan, 0.25 * problem.map.angle_step_deg)
     return refine(problem, best_around(problem, plan, around), 0.5 * around.node_deg)

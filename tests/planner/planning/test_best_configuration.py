@@ -1,5 +1,3 @@
-from functools import partial
-
 import numpy as np
 
 from planner.map.config_map import ConfigurationMap
@@ -26,4 +24,4 @@ def test_the_configuration_of_the_cheapest_plan_wins_and_none_is_left_out() -> N
 
 def test_where_no_configuration_can_cross_none_is_best() -> None:
     asked = {"a": problem_of(0.0, "a"), "b": problem_of(0.0, "b")}
-    assert best_configuration(asked, partial(dynamic_programming, grid=None)).best is None
+    assert best_configuration(asked, dynamic_programming).best is None

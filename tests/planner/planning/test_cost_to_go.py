@@ -7,9 +7,10 @@ from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.backward_step import ANY_COST
 from planner.planning.cost_to_go import cost_from, cost_to_go
-from planner.planning.dijkstra import Cells, lattice_path
+from planner.planning.dijkstra import shortest_path
+from planner.planning.lattice_choice import turn_lattice
 from planner.planning.problem import Problem
-from planner.planning.state_grid import GridError, default_grid, exact_grid
+from planner.planning.state_grid import Grid, GridError, default_grid
 from planner.table.cost import Weights
 from planner.table.motion import Limits
 from tests.planner.exhaustive_search import least_cost
@@ -23,24 +24,26 @@ def lattice_problem(seed: int, forbidden: float = 0.3, locations: int = 25) -> P
     return Problem(synthetic_map(family, seed), step_s=1.0, limits=LIMITS)
 
 
-def test_the_exact_grid_of_this_lattice_is_what_the_graph_is_built_on() -> None:
-    grid = exact_grid(lattice_problem(0), refinement=1)
-    assert (grid.angle_count, grid.speed_step_deg_s, grid.half_count) == (36, 20.0, 3)
-    assert grid.jumps.tolist() == [-2, -1, 0, 1, 2]
+# No step of this grid ends between two nodes.
+EXACT_GRID = Grid(36, 0.0, 20.0, 3, np.arange(-2, 3))
 
 
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("forbidden", [0.15, 0.4])
 def test_on_an_exact_lattice_it_is_scipys_shortest_path(seed: int, forbidden: float) -> None:
     problem = replace(lattice_problem(seed, forbidden), start_angle_deg=None)
-    to_go = cost_to_go(problem, exact_grid(problem, refinement=1))
+    to_go = cost_to_go(problem, EXACT_GRID)
     at_rest = to_go.costs[0, to_go.grid.half_count].astype(float) * to_go.unit
     at_rest[~problem.map.allowed[0]] = np.inf
-    shortest = lattice_path(problem, Cells(angle_count=36, speed_count=7, acceleration_count=5))
+    lattice = turn_lattice(problem, 3, 100_000)
+    assert lattice is not None
+    # Half of the grid's states at rest: those that a lattice around a sample has.
+    assert (lattice.q_count, lattice.half_count) == (18, 3)
+    shortest = shortest_path(problem, lattice)
     if shortest is None:
-        assert at_rest.min() > ANY_COST
+        assert at_rest[::2].min() > ANY_COST
     else:
-        assert at_rest.min() == pytest.approx(shortest.cost, rel=1e-5)
+        assert at_rest[::2].min() == pytest.approx(shortest.cost, rel=1e-5)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -48,7 +51,7 @@ def test_on_a_tiny_map_it_is_what_trying_every_motion_finds(seed: int) -> None:
     configuration_map = synthetic_map(MapFamily(0.25, 1.2, location_count=5, angle_count=18), seed)
     start = int(np.argmax(configuration_map.values[0]))
     problem = Problem(configuration_map, step_s=1.0, limits=Limits(40.0, 40.0), start_angle_deg=start * 20.0)
-    to_go = cost_to_go(problem, exact_grid(problem, refinement=1))
+    to_go = cost_to_go(problem, Grid(18, start * 20.0, 40.0, 1, np.arange(-1, 2)))
     found = cost_from(to_go.costs, to_go.grid, 0, to_go.grid.half_count, start * 20.0) * to_go.unit
     assert found == pytest.approx(least_cost(problem, [-40.0, 0.0, 40.0]), rel=1e-5)
 

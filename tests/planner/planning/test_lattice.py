@@ -59,9 +59,7 @@ def test_a_step_has_room_exactly_where_the_crossing_rule_allows_it(
                     above, below = rows.room_above[row, place], rows.room_below[row, place]
                     fits = above >= i + j and below >= -(i + j)
                     fits = fits and (rows.turn_above if speed > 0.0 else rows.turn_below)[row, place] >= turn - 1e-10
-                    expected = step_is_allowed(
-                        problem.terms.runs, k, angle, speed, (later - speed) / step_s, step_s
-                    )
+                    expected = step_is_allowed(problem.terms.runs, k, angle, speed, (later - speed) / step_s, step_s)
                     assert fits == expected, (k, i, j, q)
 
 
