@@ -22,8 +22,8 @@ from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, blocks_map, synthetic_map
 from planner.planning.crossing import step_is_allowed
 from planner.planning.dijkstra import dijkstra
-from planner.planning.lattice_choice import turn_lattice
 from planner.planning.dynamic_programming import dynamic_programming
+from planner.planning.lattice_choice import turn_lattice
 from planner.planning.local_maxima import local_maxima
 from planner.planning.plan import Outcome, Plan
 from planner.planning.plan_plots import CURVE_COLOUR, PLAN_COLOUR, draw_motion, draw_wrapped

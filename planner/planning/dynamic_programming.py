@@ -27,6 +27,9 @@ WORK = 130_000
 # The tube around a path that exceeds the limits.
 WIDE_SPEEDS_EACH_WAY, WIDE_Q_COUNT = 8, 48
 
+# What that path had promised is kept up to this share of its cost.
+KEPT = 1.005
+
 
 class Effort(NamedTuple):
     """How hard to search where the first lattice has no way.
@@ -81,7 +84,7 @@ def lattice_plan(problem: Problem, lattice: Lattice) -> Plan | None:
 
     A lattice rounds the limits down to its own speeds, which may bar the best way around the forbidden regions. So the
     limits are first rounded up; where the best path then exceeds them, a tube around it is searched within the limits.
-    Only where that costs more than the path had promised is the lattice searched within the limits, too.
+    Only where that costs clearly more than the path had promised is the lattice searched within the limits, too.
     """
     tempting = best_motion(problem, with_limits_rounded_up(lattice, problem), limits_rounded_up(lattice, problem))
     if tempting is None:
@@ -96,7 +99,7 @@ def lattice_plan(problem: Problem, lattice: Lattice) -> Plan | None:
         motion = best_motion(problem, around)
         if motion is not None:
             plans.append(refine(problem, make_plan(problem, NAME, *motion), node_deg))
-            if plans[-1].cost.total <= temptation.cost.total:
+            if plans[-1].cost.total <= KEPT * temptation.cost.total:
                 break
     return min(plans, key=lambda plan: plan.cost.total, default=None)
 

@@ -22,8 +22,8 @@ def test_a_step_or_limit_that_is_not_positive_is_refused_by_name(field: str, sen
         Problem(OPEN, numbers["step"], Limits(numbers["speed"], numbers["acceleration"]))
 
 
-@pytest.mark.parametrize("wrong", [0.0, -1.0, math.nan, math.inf])
-def test_a_weight_that_is_not_positive_is_refused_by_name(wrong: float) -> None:
+@pytest.mark.parametrize("wrong", [-1e-9, -1.0, math.nan, math.inf])
+def test_a_weight_below_0_or_not_finite_is_refused_by_name(wrong: float) -> None:
     with pytest.raises(ProblemError, match="weight of the acceleration"):
         Problem(OPEN, weights=Weights(wrong, 1.0))
     with pytest.raises(ProblemError, match="weight of the speed"):
