@@ -22,7 +22,7 @@ from planner.errors import PlannerError, ScanFileError, WorkpieceError
 from planner.geometry.mesh import MILLIMETRES, load_mesh, radius_about_axis_mm, size_fault
 from planner.kinematics.arm import Arm
 from planner.kinematics.value import ValueFunction
-from planner.table.cost import Weights, default_weights
+from planner.table.cost import Weights, costs_overflow, default_weights
 from planner.table.motion import Limits
 from planner.toml_table import TomlTable
 
@@ -89,6 +89,8 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None) -> Sca
         value = ValueFunction.read(top.table("value"))
         limits = _read_limits(top.table("limits"))
         weights = _read_weights(top.table("weights"), limits)
+        if costs_overflow(weights, limits, len(path.T_WS)):
+            raise ScanFileError(f"{file}: weights: k_a or k_w is so large that the cost of a path overflows; lower it")
     top.finish()
     return Scan(file.stem, cell, bodies, workpiece, mesh, mesh_file, path, value, limits, weights)
 

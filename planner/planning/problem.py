@@ -8,7 +8,7 @@ from planner.arrays import FloatArray
 from planner.errors import PlannerError
 from planner.map.config_map import ConfigurationMap
 from planner.planning.crossing import RunArray, free_runs, free_runs_down
-from planner.table.cost import Weights, default_weights, greatest_step_cost, pause_cost
+from planner.table.cost import Weights, costs_overflow, default_weights, greatest_step_cost, pause_cost
 from planner.table.motion import Limits
 
 
@@ -62,8 +62,7 @@ class Problem:
         weights = default_weights(self.limits) if self.weights is None else self.weights
         _check_weight("acceleration", "1/(deg/s^2)^2", weights.acceleration)
         _check_weight("speed", "1/(deg/s)^2", weights.speed)
-        penalty = pause_cost(weights, self.limits)
-        if not math.isfinite(penalty * self.map.location_count):
+        if costs_overflow(weights, self.limits, self.map.location_count):
             raise ProblemError("the weights are so large that the cost of a path overflows; lower them")
         self._check_start()
         terms = Terms(
@@ -76,7 +75,7 @@ class Problem:
             acceleration_limit_deg_s2=float(self.limits.acceleration_deg_s2),
             acceleration_weight=float(weights.acceleration),
             speed_weight=float(weights.speed),
-            pause_cost=penalty,
+            pause_cost=pause_cost(weights, self.limits),
         )
         object.__setattr__(self, "terms", terms)
 

@@ -1,5 +1,6 @@
 """What a path across the map costs: Eq. (5), (6) and (7)."""
 
+import math
 from typing import NamedTuple
 
 from planner.kernel import kernel
@@ -62,3 +63,8 @@ def greatest_step_cost(weights: Weights, limits: Limits) -> float:
 def pause_cost(weights: Weights, limits: Limits) -> float:
     """Return C_pen of `evalpath`, for a step into the forbidden region: above the greatest cost of an allowed step."""
     return 2.0 * greatest_step_cost(weights, limits)
+
+
+def costs_overflow(weights: Weights, limits: Limits, location_count: int) -> bool:
+    """Return whether the cost of a path of so many locations may exceed what a double holds."""
+    return not math.isfinite(pause_cost(weights, limits) * location_count)

@@ -18,43 +18,24 @@ from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.cost_to_go import cost_to_go, lay_out_columns
-from planner.planning.dijkstra import Cells, lattice_path
-from planner.planning.dynamic_programming import dynamic_programming, follow
+from planner.planning.dijkstra import shortest_path
+from planner.planning.dynamic_programming import dynamic_programming
+from planner.planning.lattice_choice import turn_lattice
+from planner.planning.lattice_cost_to_go import cost_to_go as lattice_cost_to_go
 from planner.planning.plan import Outcome, Plan
 from planner.planning.planners import PLANNERS, Planner
 from planner.planning.problem import Problem
 from planner.planning.ray_shooting import Rays, ray_shooting
 from planner.planning.receding import FAST_SPEED_COUNT, SPEED_COUNT, online_step, prepare_online_step, receding
 from planner.planning.smoothing import smooth
-from planner.planning.state_grid import Grid, exact_grid
+from planner.planning.state_grid import Grid
 from planner.planning.verification import verify
-from planner.table.cost import Weights, default_weights
 from planner.table.motion import Limits
+from tools.bench.default_planner import bench_default_planner, lattice_optimum
+from tools.bench.planner_families import FAMILIES
 
-MAPS_PER_FAMILY = 20
-
-
-class Family(NamedTuple):
-    """A family of problems: maps, the time step and how many times the default weights."""
-
-    name: str
-    maps: MapFamily
-    step_s: float = 0.25
-    weight_factor: float = 1.0
-
-
-FAMILIES = (
-    Family("5 % forbidden", MapFamily(0.05, 6.0)),
-    Family("20 % forbidden", MapFamily(0.2, 6.0)),
-    Family("40 % forbidden", MapFamily(0.4, 6.0)),
-    Family("small obstacles", MapFamily(0.15, 2.0)),
-    Family("large obstacles", MapFamily(0.4, 10.0)),
-    Family("drifting pattern", MapFamily(0.4, 8.0, 1.0)),
-    Family("light weights", MapFamily(0.3, 5.0), weight_factor=0.1),
-    Family("heavy weights", MapFamily(0.3, 5.0), weight_factor=30.0),
-    Family("short steps", MapFamily(0.2, 6.0), step_s=0.1),
-    Family("long steps", MapFamily(0.3, 5.0), step_s=1.0),
-)
+# All planners are compared on the first families, on which ray shooting gets along.
+COMPARED_FAMILIES = 11
 
 
 def smoothed_ray_shooting(problem: Problem) -> Outcome:
@@ -83,6 +64,7 @@ def bench(stream: TextIO) -> None:
     """Print all measurements of the planners. Times are medians on this machine; compare those of one run."""
     _bench_graph(stream)
     _bench_steps(stream)
+    bench_default_planner(stream)
     _bench_families(stream)
     _bench_scans(stream)
     _bench_growth(stream)
@@ -117,16 +99,21 @@ def _status_mb(key: str) -> float:
 
 
 def _bench_graph(stream: TextIO) -> None:
-    problem = Problem(synthetic_map(MapFamily(0.2, 5.0), seed=1), limits=Limits(40.0, 80.0))
-    grid = Grid(100, 0.0, 0.8, 50, np.arange(-10, 11))
-    ours = partial(cost_to_go, problem, grid)
-    scipys = partial(lattice_path, problem, Cells(100, 101, 21))
+    # At 4.5 s a step, speeds of multiples of 0.8 deg/s end each step on a node: 50 each way, 10 within the acceleration.
+    problem = Problem(synthetic_map(MapFamily(0.2, 5.0), seed=1), 4.5, Limits(40.0, 8.0 / 4.5))
+    lattice = turn_lattice(problem, 50, 1_000_000)
+    assert lattice is not None
+    ours = partial(lattice_cost_to_go, problem.terms, lattice)
+    scipys = partial(shortest_path, problem, lattice)
     seconds, megabytes = median_seconds(ours), peak_memory_mb(ours)
     before = time.perf_counter()
     scipy_megabytes = peak_memory_mb(scipys)
     scipy_seconds = time.perf_counter() - before
-    print("\nThe paper's graph: 100 columns x 100 angles x 101 speeds, 21 accelerations", file=stream)
-    print(f"  cost-to-go, interpolated       {seconds * 1e3:8.2f} ms {megabytes:8.1f} MB", file=stream)
+    speeds = 2 * lattice.half_count + 1
+    print(
+        f"\nThe paper's graph: 100 columns x {lattice.q_count} angles x {speeds} speeds, 21 accelerations", file=stream
+    )
+    print(f"  cost-to-go of all nodes        {seconds * 1e3:8.2f} ms {megabytes:8.1f} MB", file=stream)
     print(f"  scipy csgraph, graph and path  {scipy_seconds * 1e3:8.0f} ms {scipy_megabytes:8.0f} MB", file=stream)
     print(f"  ratio                          {scipy_seconds / seconds:8.0f}", file=stream)
 
@@ -145,9 +132,8 @@ def _bench_steps(stream: TextIO) -> None:
 
 
 def _bench_families(stream: TextIO) -> None:
-    for family in FAMILIES:
-        problems = [family_problem(family, seed) for seed in range(MAPS_PER_FAMILY)]
-        _print_comparison(family.name, problems, stream)
+    for family in FAMILIES[:COMPARED_FAMILIES]:
+        _print_comparison(family.name, [family.problem(seed) for seed in range(family.map_count)], stream)
 
 
 def _bench_scans(stream: TextIO) -> None:
@@ -155,13 +141,6 @@ def _bench_scans(stream: TextIO) -> None:
         scan = load_scan(name)
         maps = build_maps(map_problem(scan), [Configuration.LEFTY_ABOVE_NOFLIP], 100)
         _print_comparison(f"shipped scan {name}", [problem_of(scan, each, None) for each in maps.values()], stream)
-
-
-def family_problem(family: Family, seed: int) -> Problem:
-    """Return one problem of a family."""
-    limits = Limits()
-    weights = Weights(*(weight * family.weight_factor for weight in default_weights(limits)))
-    return Problem(synthetic_map(family.maps, seed), family.step_s, limits, weights)
 
 
 def _print_comparison(name: str, problems: Sequence[Problem], stream: TextIO) -> None:
@@ -204,16 +183,18 @@ def _tally(problem: Problem, tallies: dict[str, Tally]) -> bool:
     return True
 
 
-def lattice_optimum(problem: Problem) -> Plan | None:
-    """Return the optimum of a lattice on which every step ends exactly on a node, with at least 41 speeds."""
-    speed_step_deg_s = problem.limits.speed_deg_s / 20.0
-    refinement = int(np.ceil(2.0 * problem.map.angle_step_deg / problem.step_s / speed_step_deg_s))
-    return follow(problem, cost_to_go(problem, exact_grid(problem, refinement, jump_count=1001)))
-
-
 def _bench_growth(stream: TextIO) -> None:
     print("\nGrowth of the whole plan (dynamic programming; receding)", file=stream)
-    for columns, angles in ((100, 100), (200, 100), (400, 100), (100, 200), (100, 400), (1000, 100)):
+    for columns, angles in (
+        (100, 100),
+        (200, 100),
+        (400, 100),
+        (100, 200),
+        (100, 400),
+        (1000, 100),
+        (400, 360),
+        (1200, 1440),
+    ):
         family = MapFamily(0.1, 6.0, location_count=columns, angle_count=angles)
         problem = Problem(synthetic_map(family, 3), step_s=0.25)
         whole = median_seconds(partial(dynamic_programming, problem), 3)

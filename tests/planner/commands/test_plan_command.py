@@ -1,8 +1,10 @@
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import planner
 from planner.__main__ import main
 from planner.planning.plan_file import load_plan
 from planner.planning.planners import PLANNERS
@@ -41,6 +43,8 @@ def test_compare_has_a_line_for_each_planner_and_keeps_the_start(
     lines = capsys.readouterr().out.splitlines()
     table = lines[next(i for i, line in enumerate(lines) if line.startswith("planner ")) + 1 :]
     assert [line.split()[0] for line in table] == list(PLANNERS)
+    executable = [line for line in table if not line.startswith("local_maxima")]
+    assert all(line.split()[2:4] == ["0", "yes"] for line in executable), table
     assert load_plan(tmp_path / "plan.json").angles_deg[0] == 10.0
 
 
@@ -59,6 +63,34 @@ def test_the_same_scan_gives_the_same_bytes(tmp_path: Path) -> None:
         assert main(["plan", "mould", *SMALL, "--planner", "ray_shooting", "--out", str(tmp_path / name)]) == 0
     for file in (tmp_path / "a").iterdir():
         assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes()
+
+
+def weighted(folder: Path, weights: str) -> str:
+    """Return a scan file like the shipped mould with other weights; one that is not named keeps its default."""
+    text = (Path(planner.__file__).parent / "scans" / "mould.toml").read_text()
+    file = folder / "weighted.toml"
+    file.write_text(re.sub(r"k_a = .*\nk_w = .*\n", f"{weights}\n", text, count=1))
+    assert weights in file.read_text()
+    return str(file)
+
+
+@pytest.mark.parametrize("weights", ["k_a = 0.0", "k_w = 0.0", "k_a = 0.0\nk_w = 0.0"])
+def test_a_weight_of_0_gives_a_map_and_a_plan(weights: str, tmp_path: Path) -> None:
+    for command in ("map", "plan"):
+        assert main([command, weighted(tmp_path, weights), *SMALL, "--out", str(tmp_path / command)]) == 0
+
+
+@pytest.mark.parametrize("weights", ["k_a = -1e-9", "k_w = 1e305", "k_a = inf"])
+def test_a_weight_that_cannot_be_is_refused_alike_by_map_and_plan(
+    weights: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refusals = []
+    for command in ("map", "plan"):
+        assert main([command, weighted(tmp_path, weights), *SMALL, "--out", str(tmp_path / command)]) == 2
+        refusals.append(capsys.readouterr().err)
+    assert refusals[0] == refusals[1]
+    assert len(refusals[0].splitlines()) == 1
+    assert "weighted.toml" in refusals[0]
 
 
 def test_where_there_is_no_plan_the_reason_is_told_with_status_1_and_no_file(

@@ -1,0 +1,126 @@
+"""Measure the default planner on every family: what it finds and proves, its cost, and its time before and after.
+
+"Before" is the plan of the interpolated cost-to-go alone.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from typing import NamedTuple, TextIO, TypeVar
+
+import numpy as np
+
+from planner.planning.dynamic_programming import dynamic_programming
+from planner.planning.interpolated_planner import interpolated_plan
+from planner.planning.lattice_choice import turn_lattice
+from planner.planning.lattice_search import best_motion
+from planner.planning.plan import Infeasibility, NoPlan, Plan, make_plan
+from planner.planning.problem import Problem
+from planner.planning.verification import verify
+from tools.bench.planner_families import FAMILIES, Family
+
+# The lattice that plans are measured against: speeds each way, and any number of steps a column.
+SPEED_COUNT, WORK = 20, 1_000_000_000
+
+SUB_STEPS = 32
+
+Result = TypeVar("Result")
+
+
+class Case(NamedTuple):
+    """What came out for one problem; a cost is infinite without a plan."""
+
+    cost: float
+    before: float
+    optimum: float
+    is_proved: bool
+    is_executable: bool
+    seconds: float
+    seconds_before: float
+
+    @property
+    def is_missed(self) -> bool:
+        """Whether somebody else found a way."""
+        return math.isinf(self.cost) and min(self.before, self.optimum) < math.inf
+
+
+def bench_default_planner(stream: TextIO) -> None:
+    """Print a line for each family."""
+    print(
+        "\nThe default planner; cost / that of the best lattice path with 20 speeds each way, or / before", file=stream
+    )
+    print(
+        f"{'family':21} {'found':>5} {'no motion':>9} {'a way exists,':>13} {'neither':>7} {'not':>10} "
+        f"{'/ lattice':>15} {'/ before':>15} {'ms':>12}\n{'':21} {'':>5} {'(proved)':>9} {'none found':>13} {'':>7} "
+        f"{'executable':>10} {'mean (max)':>15} {'mean (max)':>15} {'before':>6} {'now':>5}",
+        file=stream,
+    )
+    for family in FAMILIES:
+        print(_line(family), file=stream)
+
+
+def lattice_optimum(problem: Problem) -> Plan | None:
+    """Return the best path of a lattice with at least 20 speeds each way; None where it has none."""
+    lattice = turn_lattice(problem, SPEED_COUNT, WORK)
+    motion = None if lattice is None else best_motion(problem, lattice)
+    return None if motion is None else make_plan(problem, "lattice", *motion)
+
+
+def measure(problem: Problem) -> Case:
+    """Plan one problem in all three ways."""
+    outcome, seconds = _timed(lambda: dynamic_programming(problem))
+    before, seconds_before = _timed(lambda: interpolated_plan(problem))
+    optimum = lattice_optimum(problem)
+    proved = isinstance(outcome, NoPlan) and outcome.infeasibility is not Infeasibility.NOT_FOUND
+    return Case(
+        outcome.cost.total if isinstance(outcome, Plan) else math.inf,
+        math.inf if before is None else before.cost.total,
+        math.inf if optimum is None else optimum.cost.total,
+        proved,
+        not isinstance(outcome, Plan) or can_be_executed(problem, outcome),
+        seconds,
+        seconds_before,
+    )
+
+
+def can_be_executed(problem: Problem, plan: Plan) -> bool:
+    """Tell whether a plan keeps the limits, and no sub-step of it is forbidden: by look-ups, without the crossing rule."""
+    if not verify(problem, plan).within_limits:
+        return False
+    for k, acceleration in enumerate(plan.accelerations_deg_s2):
+        for fraction in np.linspace(0.0, 1.0, SUB_STEPS + 1):
+            t_s = fraction * plan.step_s
+            angle_deg = plan.angles_deg[k] + plan.speeds_deg_s[k] * t_s + 0.5 * acceleration * t_s * t_s
+            if not problem.map.is_allowed(k + fraction, angle_deg):
+                return False
+    return True
+
+
+def _timed(function: Callable[[], Result]) -> tuple[Result, float]:
+    """Return the result of a call, and the shorter time of two: the first may compile."""
+    times = []
+    for _ in range(2):
+        before = time.perf_counter()
+        result = function()
+        times.append(time.perf_counter() - before)
+    return result, min(times)
+
+
+def _line(family: Family) -> str:
+    cases = [measure(family.problem(seed)) for seed in range(family.map_count)]
+    found = [case for case in cases if case.cost < math.inf]
+    milliseconds = 1e3 * float(np.median([case.seconds for case in cases]))
+    milliseconds_before = 1e3 * float(np.median([case.seconds_before for case in cases]))
+    missed = sum(case.is_missed for case in cases)
+    neither = sum(not case.is_proved and not case.is_missed for case in cases) - len(found)
+    return (
+        f"{family.name:21} {len(found):5d} {sum(case.is_proved for case in cases):9d} {missed:13d} {neither:7d} "
+        f"{sum(not case.is_executable for case in cases):10d} "
+        f"{_ratios([case.cost / case.optimum for case in found if case.optimum < math.inf]):>15} "
+        f"{_ratios([case.cost / case.before for case in found if case.before < math.inf]):>15} "
+        f"{milliseconds_before:6.1f} {milliseconds:5.1f}"
+    )
+
+
+def _ratios(ratios: list[float]) -> str:
+    return f"{np.mean(ratios):.4f} ({np.max(ratios):.3f})" if ratios else "-"
