@@ -16,13 +16,17 @@ from planner.planning.lattice_choice import turn_lattice
 from planner.planning.lattice_search import best_motion
 from planner.planning.plan import Infeasibility, NoPlan, Plan, make_plan
 from planner.planning.problem import Problem
+from planner.planning.unreachability_proof import first_unreachable_location
 from planner.planning.verification import verify
-from tools.bench.planner_families import FAMILIES, Family
+from tools.bench.planner_families import FAMILIES, Family, around_a_motion
 
 # The lattice that plans are measured against: speeds each way, and any number of steps a column.
 SPEED_COUNT, WORK = 20, 1_000_000_000
 
 SUB_STEPS = 32
+
+# Maps around known motions, and cells of speed of the proofs that are tried on each.
+ATTACKS, CELL_COUNTS = 1000, (4, 32, 128)
 
 Result = TypeVar("Result")
 
@@ -57,6 +61,17 @@ def bench_default_planner(stream: TextIO) -> None:
     )
     for family in FAMILIES:
         print(_line(family), file=stream)
+    _attack_proof(stream)
+
+
+def _attack_proof(stream: TextIO) -> None:
+    """Try to prove that maps cannot be crossed which a known motion crosses."""
+    proved = found = 0
+    for seed in range(ATTACKS):
+        problem = around_a_motion(seed).problem
+        proved += any(first_unreachable_location(problem, cells) is not None for cells in CELL_COUNTS)
+        found += isinstance(dynamic_programming(problem), Plan)
+    print(f"{ATTACKS} maps around known motions: {found} plans found, {proved} proved impossible", file=stream)
 
 
 def lattice_optimum(problem: Problem) -> Plan | None:
@@ -84,7 +99,7 @@ def measure(problem: Problem) -> Case:
 
 
 def can_be_executed(problem: Problem, plan: Plan) -> bool:
-    """Tell whether a plan keeps the limits, and no sub-step of it is forbidden: by look-ups, without the crossing rule."""
+    """Return whether a plan keeps the limits and no sub-step is forbidden: by look-ups, without the crossing rule."""
     if not verify(problem, plan).within_limits:
         return False
     for k, acceleration in enumerate(plan.accelerations_deg_s2):

@@ -34,6 +34,8 @@ from planner.table.motion import Limits
 from tools.bench.default_planner import bench_default_planner, lattice_optimum
 from tools.bench.planner_families import FAMILIES
 
+GROWING_MAPS = ((100, 100), (200, 100), (400, 100), (100, 200), (100, 400), (1000, 100), (400, 360), (1200, 1440))
+
 # All planners are compared on the first families, on which ray shooting gets along.
 COMPARED_FAMILIES = 11
 
@@ -99,7 +101,7 @@ def _status_mb(key: str) -> float:
 
 
 def _bench_graph(stream: TextIO) -> None:
-    # At 4.5 s a step, speeds of multiples of 0.8 deg/s end each step on a node: 50 each way, 10 within the acceleration.
+    # At 4.5 s a step, multiples of 0.8 deg/s end each step on a node: 50 speeds each way, 10 changes of speed.
     problem = Problem(synthetic_map(MapFamily(0.2, 5.0), seed=1), 4.5, Limits(40.0, 8.0 / 4.5))
     lattice = turn_lattice(problem, 50, 1_000_000)
     assert lattice is not None

@@ -1,4 +1,4 @@
-"""The proof is attacked: it must never speak where a motion exists. `python -m tools.soak` has longer attacks."""
+"""The proof is attacked: there must be none where a motion exists. `python -m tools.bench planner` tries 1000 maps."""
 
 import math
 
