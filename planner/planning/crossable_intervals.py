@@ -23,8 +23,9 @@ LONGER = 0.2 * SAMPLE_TOLERANCE
 OUTSIDE = 0.4 * SAMPLE_TOLERANCE
 ROUNDING = 1e-9
 
-# 32 MB; speeds that split the angles into more are given up.
+# 32 MB: speeds that split the angles into more are given up, and more speeds would take too long.
 MOST_INTERVALS = 2_000_000
+MOST_SPEEDS = 1_000
 
 
 class Crossable(NamedTuple):
@@ -52,7 +53,10 @@ def crossing_motion(problem: Problem, speeds_per_gain: int) -> Motion | None:
         problem: what is to be crossed.
         speeds_per_gain: speeds within what the acceleration limit gains in a step; the limits and the start are others.
     """
-    crossable = crossable_intervals(problem.terms, speeds_of(problem, speeds_per_gain))
+    speeds_deg_s = speeds_of(problem, speeds_per_gain)
+    if len(speeds_deg_s) > MOST_SPEEDS:
+        return None
+    crossable = crossable_intervals(problem.terms, speeds_deg_s)
     start = _start(problem, crossable)
     if start is None:
         return None
@@ -110,45 +114,60 @@ def crossable_intervals(terms: Terms, speeds_deg_s: FloatArray) -> Crossable:
     """Return from which angles the rest can be crossed, per column and speed, with steps between the given speeds."""
     steps, speeds, turn = len(terms.values) - 1, len(speeds_deg_s), float(terms.values.shape[1])
     first, count = np.zeros((steps + 1, speeds), dtype=np.int64), np.zeros((steps + 1, speeds), dtype=np.int64)
-    lows, highs = np.zeros(1024), np.full(1024, turn)
-    count[steps], end = 1, 1
-    piece_lows, piece_highs = np.empty(1024), np.empty(1024)
-    gain = terms.acceleration_limit_deg_s2 * terms.step_s * (1.0 + ROUNDING)
+    lows, highs, end = np.zeros(1024), np.full(1024, turn), 1
+    count[steps] = 1
     for k in range(steps - 1, -1, -1):
         run_lows, run_highs = runs_of(terms.runs, k)
         for s in range(speeds):
-            pieces = 0
-            for t in range(speeds):
-                if abs(speeds_deg_s[t] - speeds_deg_s[s]) > gain:
-                    continue
-                a, b = first[k + 1, t], first[k + 1, t] + count[k + 1, t]
-                if a == b:
-                    continue
-                most = pieces + (b - a + 1) * (len(run_lows) + 2) * 2
-                if most > len(piece_lows):
-                    piece_lows = np.concatenate((piece_lows, np.empty(most)))
-                    piece_highs = np.concatenate((piece_highs, np.empty(most)))
-                pieces = _step_back(
-                    terms,
-                    speeds_deg_s[s],
-                    speeds_deg_s[t],
-                    lows[a:b],
-                    highs[a:b],
-                    run_lows,
-                    run_highs,
-                    piece_lows,
-                    piece_highs,
-                    pieces,
-                )
-            pieces = unite(piece_lows, piece_highs, pieces, turn)
+            piece_lows, piece_highs = _leave(
+                terms, speeds_deg_s, s, first[k + 1], count[k + 1], lows, highs, run_lows, run_highs
+            )
+            pieces = len(piece_lows)
             while end + pieces > len(lows):
                 lows, highs = np.concatenate((lows, np.empty(len(lows)))), np.concatenate((highs, np.empty(len(highs))))
-            lows[end : end + pieces], highs[end : end + pieces] = piece_lows[:pieces], piece_highs[:pieces]
+            lows[end : end + pieces], highs[end : end + pieces] = piece_lows, piece_highs
             first[k, s], count[k, s] = end, pieces
             end += pieces
         if count[k].max() == 0 or end > MOST_INTERVALS:
             break
     return Crossable(speeds_deg_s, first, count, lows[:end], highs[:end])
+
+
+@kernel
+def _leave(
+    terms: Terms,
+    speeds_deg_s: FloatArray,
+    s: int,
+    first: IndexArray,
+    count: IndexArray,
+    lows: FloatArray,
+    highs: FloatArray,
+    run_lows: FloatArray,
+    run_highs: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the crossable angles of a column at speed s, given `first` and `count` of the next column's intervals."""
+    gain = terms.acceleration_limit_deg_s2 * terms.step_s * (1.0 + ROUNDING)
+    is_near = np.abs(speeds_deg_s - speeds_deg_s[s]) <= gain
+    # Of disjoint intervals and disjoint runs, few pairs meet twice around the turn.
+    room = 4 * (count * is_near).sum() * (len(run_lows) + 1)
+    piece_lows, piece_highs = np.empty(room), np.empty(room)
+    pieces = 0
+    for t in np.flatnonzero(is_near):
+        intervals = slice(first[t], first[t] + count[t])
+        pieces = _step_back(
+            terms,
+            speeds_deg_s[s],
+            speeds_deg_s[t],
+            lows[intervals],
+            highs[intervals],
+            run_lows,
+            run_highs,
+            piece_lows,
+            piece_highs,
+            pieces,
+        )
+    pieces = unite(piece_lows, piece_highs, pieces, float(terms.values.shape[1]))
+    return piece_lows[:pieces], piece_highs[:pieces]
 
 
 @kernel
@@ -216,6 +235,7 @@ def follow(terms: Terms, crossable: Crossable, angle_deg: float, speed: int) -> 
 
 @kernel
 def _cost(terms: Terms, crossable: Crossable, column: int, angle_deg: float, speed_deg_s: float, t: int) -> float:
+    """Return what the step from a state to speed t costs; infinite where it is not allowed or has no way on."""
     later = crossable.speeds_deg_s[t]
     turn = float(terms.values.shape[1])
     acceleration = (later - speed_deg_s) / terms.step_s
