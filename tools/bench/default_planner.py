@@ -5,7 +5,7 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, TextIO, TypeVar
 
 import numpy as np
@@ -24,6 +24,8 @@ from tools.bench.planner_families import FAMILIES, Family, around_a_motion
 SPEED_COUNT, WORK = 20, 1_000_000_000
 
 SUB_STEPS = 32
+
+WIDTHS = (21, 5, 9, 13, 7, 10, 15, 15, 6, 5)
 
 # Maps around known motions, and cells of speed of the proofs that are tried on each.
 ATTACKS, CELL_COUNTS = 1000, (4, 32, 128)
@@ -53,12 +55,9 @@ def bench_default_planner(stream: TextIO) -> None:
     print(
         "\nThe default planner; cost / that of the best lattice path with 20 speeds each way, or / before", file=stream
     )
-    print(
-        f"{'family':21} {'found':>5} {'no motion':>9} {'a way exists,':>13} {'neither':>7} {'not':>10} "
-        f"{'/ lattice':>15} {'/ before':>15} {'CPU ms':>12}\n{'':21} {'':>5} {'(proved)':>9} {'none found':>13} {'':>7} "
-        f"{'executable':>10} {'mean (max)':>15} {'mean (max)':>15} {'before':>6} {'now':>5}",
-        file=stream,
-    )
+    upper = ("family", "found", "no motion", "a way exists,", "neither", "not", "/ lattice", "/ before", "CPU ms", "")
+    lower = ("", "", "(proved)", "none found", "", "executable", "mean (max)", "mean (max)", "before", "now")
+    print(f"{_row(upper)}\n{_row(lower)}", file=stream)
     for family in FAMILIES:
         print(_line(family), file=stream)
     _attack_proof(stream)
@@ -128,13 +127,24 @@ def _line(family: Family) -> str:
     milliseconds_before = 1e3 * float(np.median([case.seconds_before for case in cases]))
     missed = sum(case.is_missed for case in cases)
     neither = sum(not case.is_proved and not case.is_missed for case in cases) - len(found)
-    return (
-        f"{family.name:21} {len(found):5d} {sum(case.is_proved for case in cases):9d} {missed:13d} {neither:7d} "
-        f"{sum(not case.is_executable for case in cases):10d} "
-        f"{_ratios([case.cost / case.optimum for case in found if case.optimum < math.inf]):>15} "
-        f"{_ratios([case.cost / case.before for case in found if case.before < math.inf]):>15} "
-        f"{milliseconds_before:6.1f} {milliseconds:5.1f}"
+    values = (
+        family.name,
+        str(len(found)),
+        str(sum(case.is_proved for case in cases)),
+        str(missed),
+        str(neither),
+        str(sum(not case.is_executable for case in cases)),
+        _ratios([case.cost / case.optimum for case in found if case.optimum < math.inf]),
+        _ratios([case.cost / case.before for case in found if case.before < math.inf]),
+        f"{milliseconds_before:.1f}",
+        f"{milliseconds:.1f}",
     )
+    return _row(values)
+
+
+def _row(cells: Sequence[str]) -> str:
+    first, *others = (f"{cell:>{width}}" for cell, width in zip(cells, WIDTHS, strict=True))
+    return " ".join((cells[0].ljust(len(first)), *others))
 
 
 def _ratios(ratios: list[float]) -> str:
