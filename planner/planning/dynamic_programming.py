@@ -17,12 +17,14 @@ from planner.planning.plan import Infeasibility, NoPlan, Outcome, Plan, make_pla
 from planner.planning.problem import Problem
 from planner.planning.unreachability_proof import first_unreachable_location
 from planner.planning.verification import verify
+from planner.table.motion import Motion
 
 NAME = "dynamic_programming"
 
-# Speeds each way of the lattice, at least, and its steps per column, at most.
-SPEED_COUNT = 8
-WORK = 130_000
+# The first lattice: its speeds each way, at least, and which share of the greatest speed it must have, from what is
+# wanted to what must do; and how many steps it may have per column, or in total on a short path.
+SPEEDS = ((8, NEARLY), (8, 0.9), (5, 0.9), (3, 0.8))
+WORK, TOTAL_WORK = 130_000, 13_000_000
 
 # The tube around a path that exceeds the limits.
 WIDE_SPEEDS_EACH_WAY, WIDE_Q_COUNT = 8, 48
@@ -72,18 +74,25 @@ def dynamic_programming(problem: Problem) -> Outcome:
 
 def first_plan(problem: Problem) -> Plan | None:
     """Return the best plan of the lattice that there is time for, refined; None where that has none."""
-    lattice = turn_lattice(problem, SPEED_COUNT, WORK)
+    lattice = first_lattice(problem)
     if lattice is not None:
         return lattice_plan(problem, lattice)
     plan = interpolated_plan(problem)
     return None if plan is None else refine(problem, replace(plan, planner=NAME), 0.25 * problem.map.angle_step_deg)
 
 
+def first_lattice(problem: Problem, reference: Motion | None = None) -> Lattice | None:
+    """Return the lattice that there is time for; None where even a coarse one takes too many steps."""
+    work = max(WORK, TOTAL_WORK // problem.step_count)
+    lattices = (turn_lattice(problem, count, work, reference, share) for count, share in SPEEDS)
+    return next((lattice for lattice in lattices if lattice is not None), None)
+
+
 def lattice_plan(problem: Problem, lattice: Lattice) -> Plan | None:
     """Return the best plan of a lattice, refined.
 
     A lattice rounds the limits down to its own speeds, which may bar the best way around the forbidden regions. So the
-    limits are first rounded up; where the best path then exceeds them, a tube around it is searched within the limits.
+    limits are first rounded up; where the best path then exceeds them, tubes around it are searched within the limits.
     Only where that costs clearly more than the path had promised is the lattice searched within the limits, too.
     """
     tempting = best_motion(problem, with_limits_rounded_up(lattice, problem), limits_rounded_up(lattice, problem))
@@ -93,9 +102,9 @@ def lattice_plan(problem: Problem, lattice: Lattice) -> Plan | None:
     node_deg = 0.5 * lattice.node_deg
     if verify(problem, temptation).within_limits:
         return refine(problem, temptation, node_deg)
-    wide = tube(temptation, node_deg, WIDE_SPEEDS_EACH_WAY, WIDE_Q_COUNT)
+    tubes = (tube(temptation, node_deg / part, WIDE_SPEEDS_EACH_WAY, WIDE_Q_COUNT) for part in (1, 2))
     plans = []
-    for around in (wide, lattice):
+    for around in (*tubes, lattice):
         motion = best_motion(problem, around)
         if motion is not None:
             plans.append(refine(problem, make_plan(problem, NAME, *motion), node_deg))
@@ -128,7 +137,7 @@ def _plan_through_intervals(problem: Problem, effort: Effort) -> Plan | None:
     if motion is None:
         return None
     plan = make_plan(problem, NAME, *motion)
-    around = turn_lattice(problem, SPEED_COUNT, WORK, reference=motion)
+    around = first_lattice(problem, motion)
     if around is None:
         return refine(problem, plan, 0.25 * problem.map.angle_step_deg)
     return refine(problem, best_around(problem, plan, around), 0.5 * around.node_deg)
