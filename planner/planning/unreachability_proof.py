@@ -121,7 +121,7 @@ def _step(terms: Terms, edges: FloatArray, column: int, now: Reachable) -> Reach
             low, high = max(edges[c], now.slowest), min(edges[c + 1], now.fastest)
             if low > high or later_low > later_high or later_low > high + gain or later_high < low - gain:
                 continue
-            widening = _widening(low, high, later_low, later_high, gain, scale)
+            widening = widening_between(low, high, later_low, later_high, gain, scale)
             for i in range(now.interval_count[c]):
                 pieces = _widen(
                     widening,
@@ -142,7 +142,9 @@ def _step(terms: Terms, edges: FloatArray, column: int, now: Reachable) -> Reach
 
 
 @kernel
-def _widening(low: float, high: float, later_low: float, later_high: float, gain: float, scale: float) -> Widening:
+def widening_between(
+    low: float, high: float, later_low: float, later_high: float, gain: float, scale: float
+) -> Widening:
     """Return what the steps do from a speed of one cell to a speed of another that is at most `gain` away."""
     least = max(low, later_low - gain) + max(later_low, low - gain)
     most = min(high, later_high + gain) + min(later_high, high + gain)

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
@@ -11,9 +13,9 @@ from planner.planning.lattice_choice import turn_lattice
 from planner.planning.lattice_search import best_motion
 from planner.planning.plan import make_plan
 from planner.planning.problem import Problem
-from planner.planning.unreachability_proof import first_unreachable_location
+from planner.planning.unreachability_proof import first_unreachable_location, widening_between
 from planner.planning.verification import verify
-from planner.table.motion import Limits
+from planner.table.motion import Limits, swept_angles
 from tests.planner.exhaustive_search import least_cost
 from tools.bench.planner_families import around_a_motion
 
@@ -41,6 +43,31 @@ def test_on_tiny_maps_it_never_contradicts_trying_every_motion(forbidden: float)
         assert lattice is not None
         assert best_motion(problem, lattice) is None
     assert proved >= 3
+
+
+ASIDE = st.just(0.0) | st.floats(0.0, 20.0)
+
+
+@settings(max_examples=400, deadline=None)
+@given(
+    speed=st.floats(-40.0, 40.0),
+    change=st.floats(-80.0, 80.0),
+    slack=ASIDE,
+    aside=st.tuples(ASIDE, ASIDE, ASIDE, ASIDE),
+    step_s=st.floats(0.1, 2.0),
+)
+def test_no_step_between_two_cells_does_more_or_less_than_they_are_said_to_do(
+    speed: float, change: float, slack: float, aside: tuple[float, float, float, float], step_s: float
+) -> None:
+    later, gain = speed + change, abs(change) + slack
+    low, high, later_low, later_high = speed - aside[0], speed + aside[1], later - aside[2], later + aside[3]
+    said = widening_between(low, high, later_low, later_high, gain, 0.5 * step_s)
+    lowest, highest = swept_angles(0.0, speed, (later - speed) / step_s, step_s)
+    moved = 0.5 * (speed + later) * step_s
+    assert said.least <= moved <= said.most
+    for beyond, origin in ((said.beyond_start, 0.0), (said.beyond_end, moved)):
+        assert max(beyond, 0.0) <= highest - origin + 1e-9
+        assert min(beyond, 0.0) >= lowest - origin - 1e-9
 
 
 def wall_with_a_gap(distance: int) -> Problem:
