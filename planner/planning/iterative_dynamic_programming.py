@@ -39,9 +39,9 @@ def refine(problem: Problem, plan: Plan, node_deg: float, accepts: Callable[[Pla
     passes = 0
     for _ in range(MOST_PASSES):
         better = best_around(problem, plan, tube(plan, node_deg))
-        gain = plan.cost.total - better.cost.total
-        if gain > 0.0 and accepts(better):
-            plan = better
+        is_kept = better.cost.total < plan.cost.total and accepts(better)
+        gain = plan.cost.total - better.cost.total if is_kept else 0.0
+        plan = better if is_kept else plan
         if gain < LARGE_GAIN * plan.cost.total:
             node_deg *= 0.5
             passes += 1

@@ -3,6 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner.planning.dijkstra import dijkstra
+from planner.planning.lattice import speed_unit
+from planner.planning.lattice_choice import turn_lattice
 from planner.planning.plan import Plan
 from planner.planning.ray_shooting import cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
 from planner.planning.verification import verify
@@ -10,7 +13,8 @@ from tools.figures import (
     FIGURES,
     MOMENTS,
     OBSTACLE_RAYS,
-    SHARED_CELLS,
+    SHARED_SPEED_COUNT,
+    SHARED_WORK,
     complete_rays,
     main,
     obstacle_problem,
@@ -54,17 +58,14 @@ def test_of_the_two_ways_the_cheaper_is_taken_and_the_rotation_reverses() -> Non
     assert plan.pauses == ()
 
 
-def test_the_cells_of_fig_7_are_an_exact_lattice() -> None:
+def test_the_path_of_fig_7_is_a_motion_of_a_lattice_that_has_the_speed_limit() -> None:
     problem = shared_problem()
-    step_deg = 360.0 / SHARED_CELLS.angle_count
-    speed_step = 2.0 * problem.limits.speed_deg_s / (SHARED_CELLS.speed_count - 1)
-    acceleration_step = 2.0 * problem.limits.acceleration_deg_s2 / (SHARED_CELLS.acceleration_count - 1)
-    for quantum in (
-        acceleration_step * problem.step_s / speed_step,
-        0.5 * speed_step * problem.step_s / step_deg,
-        (problem.start_angle_deg or 0.0) / step_deg,
-    ):
-        assert quantum == pytest.approx(round(quantum))
+    lattice = turn_lattice(problem, SHARED_SPEED_COUNT, SHARED_WORK)
+    assert lattice is not None
+    assert lattice.half_count * speed_unit(lattice, problem.step_s) == pytest.approx(problem.limits.speed_deg_s)
+    plan = dijkstra(problem, lattice)
+    assert isinstance(plan, Plan)
+    assert verify(problem, plan).is_executable
 
 
 @pytest.mark.parametrize("name", ["fig5", "fig6", "fig8", "fig9"])
