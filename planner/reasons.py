@@ -31,3 +31,11 @@ class Reason(IntEnum):
     JOINT_5_SPEED = 13
     JOINT_6_SPEED = 14
     """Between two steps of a joint path only; a pose on its own has no speed."""
+
+    WRIST_TURN = 15
+    """Between two steps of a joint path only: on their nearest turns, joints 4 and 6 spin the flange once around."""
+
+    @property
+    def label(self) -> str:
+        """The name as people write it: `joint 6 limit`."""
+        return self.name.lower().replace("_", " ")

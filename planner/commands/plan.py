@@ -8,33 +8,35 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from planner.cell.scan import Scan, load_scan
 from planner.cell.unit_hints import unit_hint
 from planner.commands import options
 from planner.errors import PlannerError
 from planner.execution.run_file import PLAN_FILE, RUN_RESULTS
 from planner.kinematics.configuration import Configuration
-from planner.kinematics.joint_path import JointPath
 from planner.map.config_map import ConfigurationMap
 from planner.map.map_builder import build_maps
 from planner.map.map_file import MAP_FILE, save_maps
 from planner.map.map_problem import map_problem
-from planner.planning.arm_motion import arm_motion
+from planner.planning.arm_motion import ArmMotion, arm_follows, arm_motion
+from planner.planning.arm_on_path import arm_on_path
+from planner.planning.arm_plots import plot_arm
 from planner.planning.best_configuration import best_configuration
-from planner.planning.plan import NoPlan, Outcome, Plan
+from planner.planning.plan import NoPlan, Outcome, Plan, Planner
 from planner.planning.plan_file import plan_document, save_plan
 from planner.planning.plan_plots import plot_plan
-from planner.planning.planners import DEFAULT_PLANNER, PLANNERS, Planner
+from planner.planning.planners import DEFAULT_PLANNER, PLANNERS
 from planner.planning.problem import Problem
 from planner.planning.smoothing import smooth
 from planner.planning.verification import verify
 from planner.progress import progress_line
-from planner.reasons import Reason
 from planner.set_aside import set_aside
 
 _NO_PLAN = 1
 # A run belongs to its plan: beside another plan it would pass for a run of that.
-PLAN_RESULTS = (PLAN_FILE, "plan.png", MAP_FILE, *RUN_RESULTS)
+PLAN_RESULTS = (PLAN_FILE, "plan.png", "arm.png", MAP_FILE, *RUN_RESULTS)
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -42,7 +44,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "plan",
         help="plan the table's motion along a scan",
-        description="Choose the table's motion across a scan's configuration map; exit status 1 where there is none.",
+        description="Choose the table's motion across a scan's configuration map. Exit status 1 where there is none,"
+        " or none that the arm can follow.",
         epilog="example: python -m planner plan mould --compare --out build/mould",
     )
     options.add_scan(parser)
@@ -54,7 +57,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument("--smooth", action="store_true", help="lower the plan's acceleration peaks afterwards")
     parser.add_argument("--compare", action="store_true", help="run all planners and print a table of them")
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for plan.json, plan.png and the map"
+        "--out", type=Path, required=True, metavar="DIR", help="folder for plan.json, its pictures and the map"
     )
     parser.set_defaults(run=run)
 
@@ -70,7 +73,7 @@ def _angle(text: str) -> float:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write `plan.json`, `map.npz` and `plan.png`, print cost, time and margins, and return the exit status."""
+    """Write plan, map and pictures, print cost, time and margins, and return the exit status."""
     set_aside(arguments.out, PLAN_RESULTS)
     best = arguments.configuration == "best"
     asked = list(Configuration) if best else [Configuration.parse(arguments.configuration)]
@@ -83,37 +86,43 @@ def run(arguments: argparse.Namespace) -> int:
     for label, outcome in comparison.outcomes.items():
         sys.stderr.write(configuration_line(label, outcome))
     if comparison.best is None:
-        hint = unit_hint(scan)
-        sys.stdout.write(f"{scan.name}: there is no plan{f': {hint}' if hint else ''}\n")
+        hint = unit_hint(scan) or comparison.refusal
+        sys.stdout.write(f"{scan.name}: there is no plan; {hint}\n")
         return _NO_PLAN
     chosen, plan = problems[comparison.best], comparison.outcomes[comparison.best]
     assert isinstance(plan, Plan)
-    joints = arm_motion(scan, Configuration.parse(comparison.best), plan)
-    _write(arguments.out, scan, chosen, plan, joints)
-    sys.stdout.write(report(scan, chosen, plan, joints))
+    assert chosen.arm is not None
+    motion = arm_motion(chosen.arm, plan)
+    _write(arguments.out, scan, chosen, plan, motion)
+    sys.stdout.write(report(scan, chosen, plan, motion))
     if arguments.compare:
         start = replace(chosen, start_angle_deg=float(plan.angles_deg[0]))
         sys.stdout.write(comparison_table(start, {name: timed(planner)(start) for name, planner in PLANNERS.items()}))
-    return 0 if joints.step is None and verify(chosen, plan).is_executable else _NO_PLAN
+    return 0 if motion.step is None and verify(chosen, plan).is_executable else _NO_PLAN
 
 
 def problem_of(scan: Scan, configuration_map: ConfigurationMap, start_angle_deg: float | None) -> Problem:
     """Return the planning problem of a scan in one configuration, from rest."""
+    configuration = Configuration.parse(str(configuration_map.metadata["configuration"]))
     return Problem(
         configuration_map,
         scan.path.step_s,
         scan.limits,
         scan.weights,
         start_angle_deg,
+        arm=arm_on_path(scan, configuration),
     )
 
 
 def smoothed(planner: Planner) -> Planner:
-    """Return the planner followed by smoothing."""
+    """Return the planner followed by smoothing, unless that makes a plan that the arm cannot follow."""
 
     def plan(problem: Problem) -> Outcome:
         outcome = planner(problem)
-        return smooth(problem, outcome) if isinstance(outcome, Plan) else outcome
+        if isinstance(outcome, NoPlan):
+            return outcome
+        smoother = smooth(problem, outcome)
+        return smoother if arm_follows(problem, smoother) or not arm_follows(problem, outcome) else outcome
 
     return plan
 
@@ -122,7 +131,8 @@ def timed(planner: Planner) -> Planner:
     """Return the planner with its plans' computing time filled in; the first call, which may compile, is left out."""
 
     def plan(problem: Problem) -> Outcome:
-        planner(problem)
+        if isinstance(no_plan := planner(problem), NoPlan):
+            return no_plan
         before = time.perf_counter()
         outcome = planner(problem)
         seconds = time.perf_counter() - before
@@ -136,7 +146,7 @@ def configuration_line(label: str, outcome: Outcome) -> str:
     return f"{label:20} {outcome.reason if isinstance(outcome, NoPlan) else f'cost {outcome.cost.total:.3f}'}\n"
 
 
-def report(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -> str:
+def report(scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -> str:
     """Return cost, time and margins of a plan, for people."""
     checked, cost = verify(problem, plan), plan.cost
     lines = [
@@ -149,20 +159,39 @@ def report(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -> str:
         f"margins       {checked.clearance_deg:.2f} deg to the nearest forbidden sample, "
         f"{checked.speed_margin_deg_s:.2f} deg/s to the speed limit, "
         f"{checked.acceleration_margin_deg_s2:.2f} deg/s^2 to the acceleration limit",
-        f"arm           {_arm_verdict(joints)}",
+        f"arm           {_arm_verdict(motion)}",
+        *_arm_lines(motion),
     ]
     return "\n".join(lines) + "\n"
 
 
-def _arm_verdict(joints: JointPath) -> str:
-    if joints.step is None:
+def _arm_verdict(motion: ArmMotion) -> str:
+    if motion.step is None:
         return "follows within joint limits and joint speeds"
-    return f"cannot follow at location {joints.step}: {Reason(joints.reason).name.lower().replace('_', ' ')}"
+    return f"cannot follow at location {motion.step}: {motion.reason.label}"
+
+
+def _arm_lines(motion: ArmMotion) -> list[str]:
+    """Return the turns at the start of the joints that have more than one, and what is left of each joint's limits."""
+    ranges_deg = np.subtract(motion.arm.upper_deg, motion.arm.lower_deg)
+    turns = [
+        f"joint {j + 1} at {motion.robot_deg[0, j]:.1f} deg (turn {motion.start_turns[j]:+d})"
+        for j in np.flatnonzero(ranges_deg > 360.0)
+    ]
+    rows = (
+        ("joint margins", [f"joint {j}" for j in range(1, 7)]),
+        ("  limit, deg", [f"{margin:.1f}" for margin in motion.limit_margins_deg]),
+        ("  speed, deg/s", [f"{margin:.1f}" for margin in motion.speed_margins_deg_s]),
+    )
+    return [
+        f"start turns   {', '.join(turns) or 'no joint has more than one'}",
+        *(f"{name:14}" + "".join(f"{text:>9}" for text in texts) for name, texts in rows),
+    ]
 
 
 def comparison_table(problem: Problem, outcomes: Mapping[str, Outcome]) -> str:
     """Return a line for each planner: cost, violations, pauses and time, all from the same start."""
-    lines = [f"{'planner':20} {'cost':>10} {'forbidden steps':>15} {'within limits':>13} {'pauses':>6} {'ms':>9}"]
+    lines = [f"{'planner':20} {'cost':>10} {'forbidden steps':>15} {'within limits':>13} {'pauses':>6} {'ms':>9}  arm"]
     for name, outcome in outcomes.items():
         if isinstance(outcome, NoPlan):
             lines.append(f"{name:20} {outcome.reason}")
@@ -171,16 +200,19 @@ def comparison_table(problem: Problem, outcomes: Mapping[str, Outcome]) -> str:
         lines.append(
             f"{name:20} {outcome.cost.total:10.4f} {len(checked.forbidden_steps):15d} "
             f"{'yes' if checked.within_limits else 'no':>13} {len(outcome.pauses):6d} "
-            f"{1e3 * (outcome.computing_time_s or 0.0):9.2f}"
+            f"{1e3 * (outcome.computing_time_s or 0.0):9.2f}  "
+            f"{'follows' if arm_follows(problem, outcome) else 'cannot follow'}"
         )
     return "\n".join(lines) + "\n"
 
 
-def _write(out: Path, scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -> None:
+def _write(out: Path, scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
-        save_plan(out / PLAN_FILE, plan_document(scan, problem, plan, joints))
+        save_plan(out / PLAN_FILE, plan_document(scan, problem, plan, motion))
         save_maps(out / MAP_FILE, {Configuration.parse(plan.configuration): problem.map})
-        plot_plan(problem, plan, f"{scan.name}   {plan.configuration}   {plan.planner}", out / "plan.png")
+        title = f"{scan.name}   {plan.configuration}   {plan.planner}"
+        plot_plan(problem, plan, title, out / "plan.png")
+        plot_arm(motion, title, out / "arm.png")
     except OSError as error:
         raise PlannerError(f"{out}: the plan cannot be written there ({error.strerror or error})") from error

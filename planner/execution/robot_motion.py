@@ -6,6 +6,7 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.execution.table_motion import Phase, TableMotion
+from planner.planning.plan import Plan
 
 
 class RobotMotion(NamedTuple):
@@ -27,6 +28,18 @@ class RobotMotion(NamedTuple):
     def joints_at(self, time_s: float) -> FloatArray:
         """Return the (6,) joints at a time: what an ideal robot latches at a trigger."""
         return np.array([np.interp(time_s, self.times_s, self.joints_deg[:, j]) for j in range(6)])
+
+
+def turning_time_s(plan: Plan, joints_deg: FloatArray, max_speeds_deg_s: FloatArray) -> float:
+    """Return the time that the arm needs to turn in any pause of a plan, from its joints before it to those after it.
+
+    Args:
+        plan: the table's motion.
+        joints_deg: (n + 1, 6) the arm's joints at each scan location.
+        max_speeds_deg_s: (6,) maximum joint speeds.
+    """
+    times_s = [np.abs(joints_deg[step + 1] - joints_deg[step]) / max_speeds_deg_s for step, _, _ in plan.pauses]
+    return float(np.max(times_s, initial=0.0))
 
 
 def robot_motion(motion: TableMotion, joints_deg: FloatArray) -> RobotMotion:

@@ -5,10 +5,12 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from planner.execution.execute import Settings, bring_to, execute
 from planner.execution.free_way import check_ends, nearest_turns, turns_to_start
 from planner.execution.inside_view import ControlView, InsideView, view_of
-from planner.execution.robot_motion import robot_motion
+from planner.execution.robot_motion import robot_motion, turning_time_s
 from planner.execution.run_file import (
     PLAN_FILE,
     RUN_RESULTS,
@@ -84,6 +86,7 @@ def run_plan(
     map_file = map_file or plan_file.with_name(MAP_FILE)
     set_aside(out, (*RUN_RESULTS, PLAN_FILE, MAP_FILE), keep=(plan_file, map_file))
     run_input = load_run_input(plan_file, map_file)
+    options = options._replace(pause_times=_with_time_for_the_arm(options.pause_times, run_input))
     limits, wire = run_input.problem.limits, Wire(options.decimals, options.baud)
     motion = TableMotion(run_input.plan, limits, options.pause_times)
     check_ends(run_input.problem.map, motion)
@@ -108,6 +111,13 @@ def run_plan(
     save_robot(out, robot_motion(motion, run_input.joints_deg), record)
     plot_run(StoredRun(run_input, conditions, motion, record), checked, out / "run.png")
     return Finished(checked, duration)
+
+
+def _with_time_for_the_arm(pause_times: PauseTimes, run_input: RunInput) -> PauseTimes:
+    """Return the times of a pause in which every joint can turn at most at its maximum speed."""
+    max_speeds_deg_s = np.array(run_input.document["arm"]["max_speed_deg_s"])
+    needed_s = turning_time_s(run_input.plan, run_input.joints_deg, max_speeds_deg_s)
+    return pause_times._replace(rotate_s=max(pause_times.rotate_s, needed_s))
 
 
 def _open(options: RunOptions, stack: ExitStack) -> tuple[TableClient, InsideView | None]:

@@ -66,10 +66,14 @@ class Leg(NamedTuple):
 
 
 class PauseTimes(NamedTuple):
-    """How long the robot takes to draw the probe back in a pause of the scan, and to bring it near again."""
+    """How long the robot takes in a pause of the scan: to draw the probe back, to turn, and to bring the probe near.
+
+    It turns while the table does, which may take longer.
+    """
 
     retract_s: float = 1.0
     approach_s: float = 1.0
+    rotate_s: float = 0.0
 
 
 class TableMotion:
@@ -162,7 +166,7 @@ def _pause_legs(
     approach = MotionCommand(pause.to_angle_deg, speed, rate)
     for phase, command, least_s in (
         (Phase.RETRACT, stand, pause_times.retract_s),
-        (Phase.ROTATE, turn, 0.0),
+        (Phase.ROTATE, turn, pause_times.rotate_s),
         (Phase.APPROACH, approach, pause_times.approach_s),
     ):
         duration_s = max(least_s, time_to_rest_s(state, command) + _SETTLING_S)

@@ -1,9 +1,10 @@
 """Which arm configuration to scan in: the one whose map has the cheapest plan."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
-from planner.planning.plan import Outcome, Plan
+from planner.planning.arm_motion import arm_follows
+from planner.planning.plan import NoPlan, Outcome, Plan, Planner
 from planner.planning.problem import Problem
 
 
@@ -12,14 +13,22 @@ class Comparison(NamedTuple):
 
     Attributes:
         outcomes: what the planner answered, by configuration, in the order asked.
-        best: the configuration of the cheapest plan, the first of equal ones; None where no one has a plan.
+        best: the configuration of the cheapest plan that the arm can follow, the first of equal ones; where it can
+            follow none, of the cheapest plan; None where there is no plan.
     """
 
     outcomes: Mapping[str, Outcome]
     best: str | None
 
+    @property
+    def refusal(self) -> str:
+        """Where there is no plan, the reason of the configuration that gets farthest."""
+        refused = {name: each for name, each in self.outcomes.items() if isinstance(each, NoPlan)}
+        name, farthest = max(refused.items(), key=lambda item: item[1].location or 0)
+        return f"{name} gets farthest: {farthest.reason}"
 
-def best_configuration(problems: Mapping[str, Problem], planner: Callable[[Problem], Outcome]) -> Comparison:
+
+def best_configuration(problems: Mapping[str, Problem], planner: Planner) -> Comparison:
     """Plan for each arm configuration and compare.
 
     Costs of different configurations compare only under equal weights, limits and start; that is up to the caller.
@@ -29,5 +38,9 @@ def best_configuration(problems: Mapping[str, Problem], planner: Callable[[Probl
         planner: the planner to compare by.
     """
     outcomes = {name: planner(problem) for name, problem in problems.items()}
-    costs = {name: outcome.cost.total for name, outcome in outcomes.items() if isinstance(outcome, Plan)}
-    return Comparison(outcomes, min(costs, key=lambda name: costs[name]) if costs else None)
+    ranks = {
+        name: (not arm_follows(problems[name], outcome), outcome.cost.total)
+        for name, outcome in outcomes.items()
+        if isinstance(outcome, Plan)
+    }
+    return Comparison(outcomes, min(ranks, key=lambda name: ranks[name]) if ranks else None)

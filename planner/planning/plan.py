@@ -1,6 +1,6 @@
 """What a planner answers: a `Plan`, or `NoPlan` with the reason."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
@@ -11,6 +11,7 @@ from planner.arrays import BoolArray, FloatArray
 from planner.kernel import kernel
 from planner.map.config_map import column_value
 from planner.planning.problem import Problem, Terms
+from planner.reasons import Reason
 from planner.table.cost import PathCost, acceleration_cost, speed_cost, value_cost
 from planner.table.motion import Motion
 
@@ -34,6 +35,7 @@ class Infeasibility(Enum):
     UNREACHABLE = "no motion within the limits avoids the forbidden regions"
     """That is proved."""
     NOT_FOUND = "none found: neither a motion that avoids the forbidden regions, nor a proof that there is none"
+    ARM = "no motion was found that the arm can follow"
 
 
 @dataclass(frozen=True)
@@ -44,16 +46,19 @@ class NoPlan:
         planner: the planner's name.
         infeasibility: the kind of failure.
         location: the scan location at which it shows, where there is one.
+        joint: the limit of the arm at which it shows, where there is one.
     """
 
     planner: str
     infeasibility: Infeasibility
     location: int | None = None
+    joint: Reason | None = None
 
     @property
     def reason(self) -> str:
         """The reason in one sentence."""
-        where = "" if self.location is None else f" (location {self.location})"
+        joint = "" if self.joint is None else f"{self.joint.label}, "
+        where = "" if self.location is None else f" ({joint}location {self.location})"
         return f"{self.planner}: {self.infeasibility.value}{where}"
 
 
@@ -87,6 +92,7 @@ class Plan:
 
 
 Outcome = Plan | NoPlan
+Planner = Callable[[Problem], Outcome]
 
 
 def path_cost(

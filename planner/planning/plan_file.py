@@ -10,7 +10,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.cell.scan import Scan
 from planner.errors import PlannerError
-from planner.kinematics.joint_path import JointPath
+from planner.planning.arm_motion import ArmMotion
 from planner.planning.plan import Pause, Plan
 from planner.planning.problem import Problem
 from planner.planning.verification import verify
@@ -28,11 +28,12 @@ class PlanFileError(PlannerError):
     """A file that cannot be read or holds no plan."""
 
 
-def plan_document(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -> dict[str, Any]:
+def plan_document(scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -> dict[str, Any]:
     """Return a plan with its scan, its limits and where it comes from, as JSON can hold it.
 
     Angles are degrees, lengths mm, times s; `locations` holds the probe's poses in the workpiece frame, row by row.
-    `arm_fault` says why the arm cannot follow; such a plan is there to be looked at.
+    `start_turns` and the margins of the joints have one number a joint (see `ArmMotion`). `arm_fault` says why the arm
+    cannot follow; such a plan is there to be looked at.
     """
     checked = verify(problem, plan)
     cell = scan.cell
@@ -48,9 +49,10 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -
             "accelerations_deg_s2": plan.accelerations_deg_s2.tolist(),
             "pauses": [pause._asdict() for pause in plan.pauses],
         },
-        "joints_deg": _rounded(cell.arm.robot_deg(joints.joints)),
+        "joints_deg": _rounded(motion.robot_deg),
+        "start_turns": motion.start_turns.tolist(),
         "arm": asdict(cell.arm),
-        "arm_fault": None if joints.step is None else f"{joints.reason.name} at location {joints.step}",
+        "arm_fault": None if motion.step is None else f"{motion.reason.label} at location {motion.step}",
         "locations": _rounded(scan.path.T_WS),
         "cell": {"T_BT": _rounded(cell.T_BT), "T_TW": _rounded(cell.T_TW), "T_FS": _rounded(cell.T_FS)},
         "limits": problem.limits._asdict(),
@@ -60,6 +62,8 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, joints: JointPath) -
             "clearance_deg": checked.clearance_deg if np.isfinite(checked.clearance_deg) else None,
             "speed_deg_s": checked.speed_margin_deg_s,
             "acceleration_deg_s2": checked.acceleration_margin_deg_s2,
+            "joint_limits_deg": _rounded(motion.limit_margins_deg),
+            "joint_speeds_deg_s": _rounded(motion.speed_margins_deg_s),
         },
         "provenance": {
             "scan": scan.name,

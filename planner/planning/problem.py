@@ -7,6 +7,7 @@ from typing import NamedTuple
 from planner.arrays import FloatArray
 from planner.errors import PlannerError
 from planner.map.config_map import ConfigurationMap
+from planner.planning.arm_on_path import ArmOnPath
 from planner.planning.crossing import RunArray, free_runs, free_runs_down
 from planner.table.cost import Weights, costs_overflow, default_weights, greatest_step_cost, pause_cost
 from planner.table.motion import Limits
@@ -42,6 +43,7 @@ class Problem:
         weights: k_a and k_omega of Eq. (5); None takes the default for the limits.
         start_angle_deg: table angle at the first column; None leaves it free.
         start_speed_deg_s: table speed there; None leaves it free.
+        arm: the arm that has to follow; None plans for the table alone.
     """
 
     map: ConfigurationMap
@@ -50,6 +52,7 @@ class Problem:
     weights: Weights | None = None
     start_angle_deg: float | None = None
     start_speed_deg_s: float | None = 0.0
+    arm: ArmOnPath | None = None
     terms: Terms = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -28,6 +28,7 @@ from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
 from planner.planning.arm_check import PlannedArm, arm_fault
 from planner.planning.arm_motion import arm_motion
+from planner.planning.arm_on_path import arm_on_path
 from planner.planning.best_configuration import best_configuration
 from planner.planning.plan import Plan
 from planner.planning.planners import DEFAULT_PLANNER, PLANNERS
@@ -139,28 +140,25 @@ def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: Progre
     """Return the best motion for a scan.
 
     Raises:
-        ScanError: There is none, or the arm cannot follow it.
+        ScanError: There is none that the arm can follow.
     """
     asked = list(Configuration) if configuration == "best" else [Configuration.parse(configuration)]
     maps = build_maps(map_problem(scan, progress("distance field")), asked, angle_count, progress("map"))
-    limits = scan.limits
-    weights = scan.weights
-    problems = {each.label: Problem(map_, scan.path.step_s, limits, weights) for each, map_ in maps.items()}
+    problems = {
+        each.label: Problem(map_, scan.path.step_s, scan.limits, scan.weights, arm=arm_on_path(scan, each))
+        for each, map_ in maps.items()
+    }
     comparison = best_configuration(problems, PLANNERS[DEFAULT_PLANNER])
     if comparison.best is None:
-        hint = unit_hint(scan) or f"python -m planner plan {scan.name} tells why"
-        raise ScanError(f"{scan.name}: there is no plan; {hint}")
-    plan = comparison.outcomes[comparison.best]
+        raise ScanError(f"{scan.name}: there is no plan; {unit_hint(scan) or comparison.refusal}")
+    plan, on_path = comparison.outcomes[comparison.best], problems[comparison.best].arm
     assert isinstance(plan, Plan)
-    joints = arm_motion(scan, Configuration.parse(comparison.best), plan)
-    joints_deg = scan.cell.arm.robot_deg(joints.joints)
+    assert on_path is not None
+    joints_deg = arm_motion(on_path, plan).robot_deg
     fault = arm_fault(PlannedArm(scan.cell, scan.path.T_WS, joints_deg), plan)
-    if fault is not None or joints.step is not None:
-        raise ScanError(
-            f"{scan.name}: the arm cannot follow the plan: {fault or f'at location {joints.step}'}; change the path so"
-            " that it turns the probe less or takes more time"
-        )
-    return Planned(plan, joints_deg, limits)
+    if fault is not None:
+        raise ScanError(f"{scan.name}: the arm cannot follow the plan: {fault}")
+    return Planned(plan, joints_deg, scan.limits)
 
 
 def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) -> LatchedRun:

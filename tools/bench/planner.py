@@ -22,8 +22,8 @@ from planner.planning.dijkstra import shortest_path
 from planner.planning.dynamic_programming import dynamic_programming
 from planner.planning.lattice_choice import turn_lattice
 from planner.planning.lattice_cost_to_go import cost_to_go as lattice_cost_to_go
-from planner.planning.plan import Outcome, Plan
-from planner.planning.planners import PLANNERS, Planner
+from planner.planning.plan import Outcome, Plan, Planner
+from planner.planning.planners import PLANNERS
 from planner.planning.problem import Problem
 from planner.planning.ray_shooting import Rays, ray_shooting
 from planner.planning.receding import FAST_SPEED_COUNT, SPEED_COUNT, online_step, prepare_online_step, receding

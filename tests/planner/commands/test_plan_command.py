@@ -14,7 +14,7 @@ SMALL = ["--angles", "60", "--configuration", "LEFTY-ABOVE-NOFLIP"]
 
 def test_a_shipped_scan_gives_a_plan_a_picture_and_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "mould", *SMALL, "--out", str(tmp_path / "new")]) == 0
-    assert sorted(file.name for file in (tmp_path / "new").iterdir()) == ["map.npz", "plan.json", "plan.png"]
+    assert sorted(file.name for file in (tmp_path / "new").iterdir()) == ["arm.png", "map.npz", "plan.json", "plan.png"]
     plan = load_plan(tmp_path / "new" / "plan.json")
     assert plan.configuration == "LEFTY-ABOVE-NOFLIP"
     assert np.abs(plan.speeds_deg_s).max() <= 40.0 + 1e-9

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,7 @@ import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.__main__ import main
 from planner.arrays import FloatArray
 from planner.cell.scan import load_scan, shipped_scans
-from planner.kinematics.joint_path import JointPath
-from planner.planning.arm_motion import arm_motion
+from planner.planning.arm_motion import ArmMotion, arm_motion
 from planner.scanning import scan_run
 from planner.scanning.scan_file import scan_document
 from planner.scanning.scan_report import scan_report
@@ -207,9 +207,9 @@ def test_an_option_that_cannot_be_meant_is_refused(
 def test_a_scan_whose_arm_path_breaks_a_limit_is_refused_before_the_port_is_opened(
     scan_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def two_turns_on(*arguments: Any) -> JointPath:  # noqa: ANN401 - passed on
+    def two_turns_on(*arguments: Any) -> ArmMotion:  # noqa: ANN401 - passed on
         found = arm_motion(*arguments)
-        return found._replace(joints=found.joints + np.radians([0.0, 0.0, 0.0, 0.0, 0.0, 720.0]))
+        return replace(found, joints=found.joints + np.radians([0.0, 0.0, 0.0, 0.0, 0.0, 720.0]))
 
     monkeypatch.setattr(scan_run, "arm_motion", two_turns_on)
     monkeypatch.setattr(scan_run, "open_port", lambda *_: pytest.fail("the port was opened"))

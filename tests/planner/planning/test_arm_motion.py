@@ -10,6 +10,7 @@ from planner.kinematics.inverse_kinematics import inverse_kinematics
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
 from planner.planning.arm_motion import arm_motion
+from planner.planning.arm_on_path import arm_on_path
 from planner.planning.plan import Plan
 from planner.planning.rotate_when_blocked import rotate_when_blocked
 
@@ -32,7 +33,7 @@ def plan(scan: Scan) -> Plan:
 
 
 def test_the_joints_put_the_probe_where_the_plan_says(scan: Scan, plan: Plan) -> None:
-    motion = arm_motion(scan, CONFIGURATION, plan)
+    motion = arm_motion(arm_on_path(scan, CONFIGURATION), plan)
     poses = scan.cell.goal_flange_poses(scan.path.T_WS, plan.angles_deg)
     each = np.arange(scan.path.count)
     expected = inverse_kinematics(scan.cell.arm, poses[each, each])[0][:, CONFIGURATION]
@@ -40,11 +41,11 @@ def test_the_joints_put_the_probe_where_the_plan_says(scan: Scan, plan: Plan) ->
 
 
 def test_across_a_pause_the_arm_may_go_to_another_turn(scan: Scan, plan: Plan) -> None:
-    assert arm_motion(scan, CONFIGURATION, plan).step is None
-    assert arm_motion(scan, CONFIGURATION, replace(plan, pauses=())).step is not None
+    assert arm_motion(arm_on_path(scan, CONFIGURATION), plan).step is None
+    assert arm_motion(arm_on_path(scan, CONFIGURATION), replace(plan, pauses=())).step is not None
 
 
 def test_where_the_arm_cannot_follow_the_location_is_told(scan: Scan, plan: Plan) -> None:
     angles = plan.angles_deg.copy()
     angles[50] += 180.0
-    assert arm_motion(scan, CONFIGURATION, replace(plan, angles_deg=angles)).step == 50
+    assert arm_motion(arm_on_path(scan, CONFIGURATION), replace(plan, angles_deg=angles)).step == 50

@@ -1,10 +1,12 @@
 import numpy as np
 
 from planner.map.config_map import ConfigurationMap
-from planner.planning.best_configuration import best_configuration
+from planner.planning.best_configuration import Comparison, best_configuration
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import NoPlan, Plan
+from planner.planning.plan import Infeasibility, NoPlan, Plan
 from planner.planning.problem import Problem
+from planner.reasons import Reason
+from tests.planner.winding_arm import winding_arm
 
 
 def problem_of(value: float, configuration: str) -> Problem:
@@ -25,3 +27,23 @@ def test_the_configuration_of_the_cheapest_plan_wins_and_none_is_left_out() -> N
 def test_where_no_configuration_can_cross_none_is_best() -> None:
     asked = {"a": problem_of(0.0, "a"), "b": problem_of(0.0, "b")}
     assert best_configuration(asked, dynamic_programming).best is None
+
+
+def test_the_refusal_is_that_of_the_configuration_that_gets_farthest() -> None:
+    outcomes = {
+        "a": NoPlan("p", Infeasibility.BLOCKED_LOCATION, 3),
+        "b": NoPlan("p", Infeasibility.ARM, 17, Reason.JOINT_6_SPEED),
+        "c": NoPlan("p", Infeasibility.START_FORBIDDEN),
+    }
+    refusal = Comparison(outcomes, None).refusal
+    assert refusal == "b gets farthest: p: no motion was found that the arm can follow (joint 6 speed, location 17)"
+
+
+def test_a_cheaper_plan_that_the_arm_cannot_follow_does_not_win() -> None:
+    follows, slow = winding_arm(0.0), winding_arm(90.0, speed_6_deg_s=10.0)
+    problems = {
+        name: Problem(ConfigurationMap(np.full((5, 8), value)), arm=arm)
+        for name, value, arm in (("bright", 0.9, slow), ("dark", 0.4, follows))
+    }
+    assert best_configuration(problems, dynamic_programming).best == "dark"
+    assert best_configuration({"bright": problems["bright"]}, dynamic_programming).best == "bright"

@@ -8,6 +8,7 @@ from planner.cell.scan import Scan, load_scan
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
 from planner.planning.arm_motion import arm_motion
+from planner.planning.arm_on_path import arm_on_path
 from planner.planning.plan import Pause, Plan, make_plan
 from planner.planning.plan_file import PlanFileError, load_plan, plan_document, save_plan
 from planner.planning.problem import Problem
@@ -32,7 +33,9 @@ def still_plan(scan: Scan, pauses: tuple[Pause, ...] = ()) -> tuple[Problem, Pla
 
 def test_a_plan_comes_back_as_it_was(scan: Scan, tmp_path: Path) -> None:
     problem, plan = still_plan(scan, (Pause(3, 0.0, 90.0),))
-    save_plan(tmp_path / "plan.json", plan_document(scan, problem, plan, arm_motion(scan, CONFIGURATION, plan)))
+    save_plan(
+        tmp_path / "plan.json", plan_document(scan, problem, plan, arm_motion(arm_on_path(scan, CONFIGURATION), plan))
+    )
     loaded = load_plan(tmp_path / "plan.json")
     for name in ("angles_deg", "speeds_deg_s", "accelerations_deg_s2"):
         assert np.array_equal(getattr(loaded, name), getattr(plan, name))
@@ -43,7 +46,7 @@ def test_a_plan_comes_back_as_it_was(scan: Scan, tmp_path: Path) -> None:
 
 def test_the_file_holds_what_running_it_needs(scan: Scan) -> None:
     problem, plan = still_plan(scan)
-    document = plan_document(scan, problem, plan, arm_motion(scan, CONFIGURATION, plan))
+    document = plan_document(scan, problem, plan, arm_motion(arm_on_path(scan, CONFIGURATION), plan))
     assert np.array(document["joints_deg"]).shape == (scan.path.count, 6)
     assert np.array(document["locations"]) == pytest.approx(scan.path.T_WS, abs=1e-8)
     assert np.array(document["cell"]["T_BT"]) == pytest.approx(scan.cell.T_BT)
@@ -68,7 +71,7 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
 
 def test_a_damaged_plan_is_refused(scan: Scan, tmp_path: Path) -> None:
     problem, plan = still_plan(scan)
-    document = plan_document(scan, problem, plan, arm_motion(scan, CONFIGURATION, plan))
+    document = plan_document(scan, problem, plan, arm_motion(arm_on_path(scan, CONFIGURATION), plan))
     document["table"]["angles_deg"].pop()
     save_plan(tmp_path / "plan.json", document)
     with pytest.raises(PlanFileError, match="damaged"):

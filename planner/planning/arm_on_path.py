@@ -1,0 +1,36 @@
+"""The arm along a scan path in one configuration: its joints at any location and table angle."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from planner.arrays import CodeArray, FloatArray, IndexArray
+from planner.cell.scan import Scan
+from planner.kinematics.arm import Arm
+from planner.kinematics.configuration import Configuration
+from planner.kinematics.inverse_kinematics import inverse_kinematics
+
+
+@dataclass(frozen=True, eq=False)
+class ArmOnPath:
+    """What planning has to know of the arm.
+
+    Attributes:
+        arm: joint limits and joint speeds.
+        solve: from scan locations (m,) and table angles (m,) in degrees to the joints (m, 6) in radians, each on the
+            turn nearest the middle of its range, and the reasons (m,) of the inverse kinematics.
+    """
+
+    arm: Arm
+    solve: Callable[[IndexArray, FloatArray], tuple[FloatArray, CodeArray]]
+
+
+def arm_on_path(scan: Scan, configuration: Configuration) -> ArmOnPath:
+    """Return the arm of a scan in one configuration."""
+    cell = scan.cell
+    T_TF = cell.location_factors(scan.path.T_WS)
+
+    def solve(locations: IndexArray, angles_deg: FloatArray) -> tuple[FloatArray, CodeArray]:
+        joints, reasons = inverse_kinematics(cell.arm, cell.table_factors(angles_deg) @ T_TF[locations])
+        return joints[:, configuration], reasons[:, configuration]
+
+    return ArmOnPath(cell.arm, solve)
