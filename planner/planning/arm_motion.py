@@ -21,8 +21,8 @@ class ArmMotion:
         arm: joint limits and joint speeds.
         joints: (n + 1, 6) in radians at each location; rows out of reach are NaN.
         speeds_deg_s: (n + 1, 6) at which each location is reached; 0 at the start and after a pause.
-        start_turns: (6,) whole turns of the robot's own angles at the start, counted from the turn nearest the middle of
-            each joint's range.
+        start_turns: (6,) whole turns of the robot's own angles at the start, counted from the turn nearest the middle
+            of each joint's range.
         reason: REACHED when the arm can follow the plan, else why it cannot.
         step: the first location at which it cannot.
     """
