@@ -8,6 +8,7 @@ Voltage and torque are constant over a tick, so the state at its end is a linear
 The electrical time constant (0.11 ms) is far below the tick: an Euler step at 1 ms would diverge.
 """
 
+from operator import mul
 from typing import NamedTuple
 
 Matrix = list[list[float]]
@@ -74,4 +75,6 @@ def matrix_exponential(matrix: Matrix) -> Matrix:
 
 
 def _product(a: Matrix, b: Matrix) -> Matrix:
-    return [[sum(x * y for x, y in zip(row, column, strict=True)) for column in zip(*b, strict=True)] for row in a]
+    columns = list(zip(*b, strict=True))
+    nothing = [0.0] * len(columns)
+    return [[sum(map(mul, row, column)) for column in columns] if any(row) else nothing for row in a]

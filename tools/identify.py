@@ -15,11 +15,13 @@ from planner.whole_file import write_whole
 from protocol.client import TableClient
 from protocol.errors import TableError
 from tools.command_line import check_writable, ended
+from tools.identification.errors import RecordingError
 from tools.identification.excitation import excitation
+from tools.identification.fit_checks import check_fit, motor_at_odds
 from tools.identification.fit_report import fit_report, table_toml, verdict
 from tools.identification.identify_table import identify
 from tools.identification.recorder import record
-from tools.identification.recording import RecordingError, read_recording, write_recording
+from tools.identification.recording import read_recording, write_recording
 from tools.identification.recording_checks import LEAST_DURATION_S, check_recording
 from tools.progress import Progress
 
@@ -67,12 +69,19 @@ def _fit(options: argparse.Namespace) -> int:
         raise RecordingError(f"{options.recording}: {error}") from error
     with Progress("fitting") as progress:
         found = identify(config, recording, progress.show)
+    try:
+        check_fit(found)
+    except RecordingError as error:
+        raise RecordingError(f"{options.recording}: {error}") from error
     print("\n".join(map(verdict, found.constants)))
-    untold = [constant.name for constant in found.constants if constant.name in _NEEDED and not constant.told]
-    if untold:
+    missing = [constant.name for constant in found.constants if constant.name in _NEEDED and not constant.identifiable]
+    if missing:
         raise RecordingError(
-            f"{options.recording}: cannot tell {', '.join(untold)}: too short, or too little excitation"
+            f"{options.recording}: {', '.join(missing)} not identifiable: too short, or too little excitation"
         )
+    odds = motor_at_odds(found, config)
+    if odds:
+        print(f"identify: warning: {odds}", file=sys.stderr)
     page = fit_report(found, config, str(options.recording))
     write_whole(options.out, table_toml(found))
     write_whole(report, page)

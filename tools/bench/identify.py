@@ -18,8 +18,9 @@ import emulator  # noqa: F401  # teaches pyserial the port emulator://
 from emulator.config import load_config
 from protocol.client import TableClient
 from tools.bench.timing import print_table
+from tools.identification.constants import DERIVED
 from tools.identification.excitation import excitation
-from tools.identification.identify_table import DERIVED, identify
+from tools.identification.identify_table import identify
 from tools.identification.recorder import record
 from tools.identification.recording import WireRecording
 from tools.identification.recording_checks import check_recording
@@ -125,5 +126,5 @@ def _identified(config: Path, recording: WireRecording) -> dict[str, Found]:
     found = {}
     for name, _, function in DERIVED:
         estimate, true = constants[name], function(truth)
-        found[name] = Found(estimate.value / true - 1.0, estimate.low <= true <= estimate.high, estimate.told)
+        found[name] = Found(estimate.value / true - 1.0, estimate.low <= true <= estimate.high, estimate.identifiable)
     return found

@@ -1,191 +1,290 @@
-"""Estimation of the constants: the most likely ones, given what was taken for granted beforehand.
+"""Estimation of the constants: the maximum of the posterior, by an iterated ensemble smoother.
 
-The answer of a table with dry friction and backlash is rugged in its constants: the posterior has many narrow peaks on
-long ridges. So the way leads from a coarse scale, at which the peaks merge, to a fine one. First Newton's method with
-Levenberg's damping leads to the foot of the highest ridge, from several starts; then an evolution strategy follows it.
+The posterior has many narrow peaks on long ridges. Each round simulates an ensemble of constants, fits a linear model
+to the simulated angles, maximizes the posterior of that model, and moves there if the simulation confirms it. The first
+rounds accept prediction errors of a hundredth of a degree, at which the peaks merge; the last rounds a fraction of a
+count. Several chains start from different values of the backlash; the better ones continue at each level.
+
+Method: Y. Chen and D. Oliver, "Levenberg-Marquardt forms of the iterative ensemble smoother", Computational Geosciences
+17 (2013) 689-703; here with the likelihood of intervals instead of a normal one.
 """
 
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from tools.emulated import Array
-from tools.identification.evolution_strategy import climb
+from tools.identification.ensemble import Ensemble, drawn, regressed
 from tools.identification.likelihood import Intervals
 
-Foretell = Callable[[Array], Array]
-"""Returns the angles (deg) that the readings should tell, for a vector of constants, but for the drift."""
+DEBUG = False
+Predict = Callable[[Array], Array]
+"""Returns the angles (deg) that the readings should show, for a vector of constants, without the drift."""
 
-_COARSE_SCALES_DEG = (2e-2, 8e-3, 3e-3)
-_COARSE_ROUNDS = 4
-_COARSE_STRIDE = 4.0
 
-_POPULATION = 16
-_FINE = ((3e-3, 20), (1.5e-3, 40), (7e-4, 40), (3e-4, 50))
-"""Scales in deg, and for how many generations each."""
-_ASCENTS, _STILL_RISING = 5, 3.0
-"""How often at most, and by how much the posterior's logarithm must rise for one more: a climb may end half-way."""
-_DRIFT_ROUNDS = 4
+class Level(NamedTuple):
+    """A part of the search: at which scale, for how many rounds, and how many chains continue after it."""
+
+    least_deg: float
+    rounds: int
+    members: int
+    survivors: int
+
+
+FIRST_LEVEL = Level(2e-2, 5, 28, 1)
+LEVELS = (
+    Level(1e-2, 2, 28, 5),
+    Level(5e-3, 2, 28, 4),
+    Level(2.5e-3, 2, 28, 3),
+    Level(1.2e-3, 2, 32, 3),
+    Level(6e-4, 3, 32, 2),
+    Level(3e-4, 7, 36, 2),
+)
+
+_FIRST_SPREAD = 0.25
+"""Standard deviation of the first ensemble, as a share of the prior's."""
+
+_REACH = (0.25, 4.0)
+"""Least and greatest covariance of an ensemble, as a share of the posterior's."""
+_SHORTER, _LONGER = 0.3, 1.5
+_TRUST = 2.0
+"""How far a step leads at most, in standard deviations of the ensemble."""
+_STEPS = (1.0, 0.5, 0.25)
+
+_NEWTON_ROUNDS, _NEWTON_GAIN = 12, 0.05
+_DRIFT_ROUNDS, _DRIFT_GAIN = 6, 0.01
 
 _CONFIDENCE_SCALE_DEG = 1.5e-3
-_CONFIDENCE_STRIDE = 8.0
-"""The covariance sees the readings no sharper than so: closer by, what it would tell of is one of many narrow peaks."""
-
-
-class Prior(NamedTuple):
-    """What is taken for granted: mean and standard deviation of each component."""
-
-    mean: Array
-    deviation: Array
+"""The covariance counts no reading as more accurate than this: finer detail belongs to one of many narrow peaks."""
+_CONFIDENCE_MEMBERS = (60, 60, 120)
+_LEAST_INFORMATION = 0.05
+"""The share of an information that is left at least after noise is subtracted from it."""
+_EQUAL_HEIGHT = 8.0
+"""A peak that is lower by this is less likely by a factor e: the height of a narrow peak is partly chance."""
 
 
 class Estimate(NamedTuple):
-    """A peak of the posterior."""
+    """A peak of the posterior, in standard units."""
 
     vector: Array
     covariance: Array
+    likelihood_information: Array  # about the constants and the drift, without the prior
     log_posterior: float
-    scale_deg: float  # of what the model does not foretell
-    foretold_deg: Array
+    scale_deg: float  # of the prediction error
+    predicted_deg: Array
 
 
 class Posterior(NamedTuple):
-    """The problem: readings, model and prior.
+    """The problem: readings and model.
 
-    A vector holds the constants, then the drift's knots. `steps` are the differences of the constants by which
-    derivatives are taken; a constant whose step is 0 is too rugged for that, and left to the evolution strategy.
+    A vector holds the constants, then the coefficients of the drift, both in standard units: beforehand each component
+    is normally distributed with mean 0 and standard deviation 1.
     """
 
     readings: Intervals
-    foretell: Foretell
-    drift: Array  # (readings, knots)
-    prior: Prior
-    steps: Array
+    predict: Predict
+    drift: Array  # (readings, coefficients)
+    size: int  # how many constants
 
-    def angles_deg(self, vector: Array) -> Array:
-        """Return the angles that the readings should tell."""
-        size = len(self.steps)
-        return self.foretell(vector[:size]) + self.drift @ vector[size:]
-
-    def height(self, vector: Array, foretold_deg: Array, scale_deg: float) -> float:
+    def height(self, vector: Array, predicted_deg: Array, scale_deg: float) -> float:
         """Return the logarithm of the posterior."""
-        distance = (vector - self.prior.mean) / self.prior.deviation
-        return self.readings.log_likelihood(foretold_deg, scale_deg) - 0.5 * float(distance @ distance)
-
-    def jacobian(self, vector: Array, stride: float) -> Array:
-        """Return the derivatives of the foretold angles, by differences of `stride` steps each way."""
-        size = len(self.steps)
-        columns = np.zeros((size, len(self.drift)))
-        for index, step in enumerate(self.steps * stride):
-            if step:
-                shift = np.zeros(size)
-                shift[index] = step
-                ends = (self.foretell(vector[:size] + sign * shift) for sign in (1.0, -1.0))
-                columns[index] = np.subtract(*ends) / (2.0 * step)
-        return np.hstack([columns.T, self.drift])
-
-    def information(self, jacobian: Array, foretold_deg: Array, scale_deg: float) -> Array:
-        """Return the negative Hessian of the logarithm, with the model taken as linear."""
-        weight = self.readings.curvature(foretold_deg, scale_deg)
-        result: Array = jacobian.T @ (jacobian * weight[:, None]) + np.diag(self.prior.deviation**-2.0)
-        return result
+        return self.readings.log_likelihood(predicted_deg, scale_deg) - 0.5 * float(vector @ vector)
 
     def with_drift(self, constants: Array, drift: Array, scale_deg: float) -> tuple[Array, Array]:
         """Return the vector with the likeliest drift, by Newton's method from a drift near it, and its angles."""
-        size = len(self.steps)
-        deviation = self.prior.deviation[size:]
-        still_deg = self.foretell(constants)
-        for _ in range(_DRIFT_ROUNDS if len(drift) else 0):
-            foretold = still_deg + self.drift @ drift
-            slope = self.drift.T @ self.readings.slope(foretold, scale_deg) - drift / deviation**2.0
-            weight = self.readings.curvature(foretold, scale_deg)
-            information = self.drift.T @ (self.drift * weight[:, None]) + np.diag(deviation**-2.0)
-            drift = drift + np.linalg.solve(information, slope)
-        return np.concatenate([constants, drift]), still_deg + self.drift @ drift
+        basis = np.vstack([np.zeros((self.size, len(drift))), np.eye(len(drift))])
+        model = _LinearPosterior(
+            self, np.concatenate([constants, drift]), basis, self.predict(constants) + self.drift @ drift, self.drift
+        )
+        move = model.maximum(scale_deg, np.full(len(drift), np.inf), _DRIFT_ROUNDS, _DRIFT_GAIN)
+        return model.origin + basis @ move, model.still_deg + self.drift @ move
 
 
-def estimate(posterior: Posterior, starts: list[Array], progress: Callable[[float], None] = lambda _: None) -> Estimate:
-    """Return the highest peak found from the starts."""
-    rounds = len(starts) + _ASCENTS
-    feet = []
-    for index, start in enumerate(starts):
-        foot = _newton(posterior, start, _COARSE_SCALES_DEG[0])
-        for least_deg in _COARSE_SCALES_DEG[1:]:
-            foot = _newton(posterior, foot.vector, least_deg)
-        feet.append(foot)
-        progress((index + 1) / rounds)
-    foot = _with_covariance(posterior, max(feet, key=lambda each: each.log_posterior), _COARSE_SCALES_DEG[-1])
-    peak, chance = foot, np.random.default_rng(0)
-    for ascent in range(_ASCENTS):
-        found = _ascend(posterior, peak, foot.covariance, chance)
-        rise = found.log_posterior - peak.log_posterior
-        peak = found if rise > 0.0 else peak
-        progress((len(starts) + ascent + 1) / rounds)
-        if rise < _STILL_RISING:
+class _Chain(NamedTuple):
+    """A search: where it is, and how its next ensemble is spread."""
+
+    vector: Array
+    predicted_deg: Array
+    covariance: Array  # of the constants
+    reach: float
+    height: float  # at the best scale of its level
+
+
+def estimate(
+    posterior: Posterior, forked: int, values: list[float], progress: Callable[[float], None] = lambda _: None
+) -> Estimate:
+    """Return the highest peak found, with a covariance that includes other peaks of about its height.
+
+    Args:
+        posterior: The problem.
+        forked: The index of the constant in which the chains differ at first.
+        values: Its value in each chain.
+        progress: Called with the share that is done.
+    """
+    chance = np.random.default_rng(0)
+    first = _FIRST_SPREAD**2 * np.eye(posterior.size)
+    chains = [_Chain(np.zeros(posterior.size + posterior.drift.shape[1]), np.empty(0), first, _REACH[1], -np.inf)]
+    counts = [1, len(values), *(level.survivors for level in LEVELS[:-1])]
+    work = sum(level.rounds * count for level, count in zip((FIRST_LEVEL, *LEVELS), counts, strict=True))
+    done = 0
+    for level in (FIRST_LEVEL, *LEVELS):
+        for _ in range(level.rounds):
+            chains = [_advanced(posterior, chain, level, chance) for chain in chains]
+            done += len(chains)
+            progress(done / work)
+        if DEBUG: print("    ", level.least_deg, [(round(c.height,1), round(float(np.exp(np.log(10)+1.5*c.vector[3])),2)) for c in chains],flush=True)
+        chains = sorted(chains, key=lambda chain: -chain.height)[: level.survivors]
+        if level is FIRST_LEVEL:
+            chains = [_forked(chains[0], first, forked, value) for value in values]
+    return _with_covariance(posterior, chains, chance)
+
+
+def _forked(chain: _Chain, first: Array, index: int, value: float) -> _Chain:
+    vector = chain.vector.copy()
+    vector[index] = value
+    return _Chain(vector, np.empty(0), first, _REACH[1], -np.inf)
+
+
+def _advanced(posterior: Posterior, chain: _Chain, level: Level, chance: np.random.Generator) -> _Chain:
+    """Return a chain after one round: ensemble, linear model, step, and the spread of the next ensemble."""
+    size, drift = posterior.size, chain.vector[posterior.size :]
+    ensemble = drawn(posterior.predict, chain.vector[:size], chain.covariance, level.members, chance)
+    model = _LinearPosterior.of(posterior, ensemble, drift)
+    scale_deg = posterior.readings.best_scale_deg(model.still_deg, level.least_deg)
+    reachable = np.array([_TRUST] * size + [np.inf] * len(drift))
+    move = model.maximum(scale_deg, reachable, _NEWTON_ROUNDS, _NEWTON_GAIN)
+
+    if not len(chain.predicted_deg):
+        vector, predicted_deg = posterior.with_drift(ensemble.center, drift, scale_deg)
+        chain = chain._replace(vector=vector, predicted_deg=predicted_deg)
+    height = posterior.height(chain.vector, chain.predicted_deg, scale_deg)
+    heights = [
+        posterior.height(np.concatenate([ensemble.center + ensemble.root @ unit, drift]), angles_deg, scale_deg)
+        for unit, angles_deg in zip(ensemble.units, ensemble.values + posterior.drift @ drift, strict=True)
+    ]
+    units = [*(share * move[:size] for share in _STEPS), ensemble.units[int(np.argmax(heights))]]
+    reach = max(chain.reach * _SHORTER, _REACH[0])
+    for unit in units:
+        vector, predicted_deg = posterior.with_drift(ensemble.center + ensemble.root @ unit, drift, scale_deg)
+        if posterior.height(vector, predicted_deg, scale_deg) > height:
+            chain = chain._replace(vector=vector, predicted_deg=predicted_deg)
+            reach = min(chain.reach * _LONGER, _REACH[1])
             break
-    return _with_covariance(posterior, peak, _CONFIDENCE_SCALE_DEG)
+    information = model.information(move, scale_deg) + model.prior_information()
+    covariance = ensemble.root @ np.linalg.inv(information)[:size, :size] @ ensemble.root.T
+    scale_deg = posterior.readings.best_scale_deg(chain.predicted_deg, level.least_deg)
+    return _Chain(
+        chain.vector,
+        chain.predicted_deg,
+        _limited(reach * covariance),
+        reach,
+        posterior.height(chain.vector, chain.predicted_deg, scale_deg),
+    )
 
 
-def _ascend(posterior: Posterior, peak: Estimate, covariance: Array, chance: np.random.Generator) -> Estimate:
-    """Return a peak that is found from populations as wide as the covariance at first, then ever narrower."""
-    size = len(posterior.steps)
-    spread = covariance[:size, :size]
-    for least_deg, generations in _FINE:
-        peak, spread = _evolve(posterior, peak, spread, least_deg, generations, chance)
-    return peak
+def _with_covariance(posterior: Posterior, chains: list[_Chain], chance: np.random.Generator) -> Estimate:
+    """Return the end of the highest chain with the covariance about it; other chains count by their heights."""
+    best, *others = chains
+    size, drift = posterior.size, best.vector[posterior.size :]
+    scale_deg = posterior.readings.best_scale_deg(best.predicted_deg, LEVELS[-1].least_deg)
+    coarse_deg = max(scale_deg, _CONFIDENCE_SCALE_DEG)
+    covariance = best.covariance
+    for members in _CONFIDENCE_MEMBERS:
+        ensemble = drawn(posterior.predict, best.vector[:size], covariance, members, chance)
+        model = _LinearPosterior.of(posterior, ensemble, drift)
+        information, spurious = model.measured_information(coarse_deg)
+        unrooted = np.linalg.inv(model.basis)
+        information, spurious = (unrooted.T @ matrix @ unrooted for matrix in (information, spurious))
+        whole: Array = np.linalg.inv(information + np.eye(len(best.vector))).astype(np.float64)
+        whole = whole + whole @ spurious @ whole
+        covariance = _limited(whole[:size, :size])
+    for other in others:
+        odds = np.exp(min(0.0, other.height - best.height) / _EQUAL_HEIGHT)
+        apart = other.vector - best.vector
+        whole = whole + odds / (1.0 + odds) * np.outer(apart, apart)
+    return Estimate(best.vector, whole, information, best.height, scale_deg, best.predicted_deg)
 
 
-def _newton(posterior: Posterior, start: Array, least_deg: float) -> Estimate:
-    """Return where Newton's method comes to in a few rounds."""
-    vector, foretold, damping = start, posterior.angles_deg(start), 1e-3
-    scale_deg = posterior.readings.best_scale_deg(foretold, least_deg)
-    for _ in range(_COARSE_ROUNDS):
-        height = posterior.height(vector, foretold, scale_deg)
-        jacobian = posterior.jacobian(vector, _COARSE_STRIDE)
-        slope = jacobian.T @ posterior.readings.slope(foretold, scale_deg)
-        slope -= (vector - posterior.prior.mean) / posterior.prior.deviation**2
-        information = posterior.information(jacobian, foretold, scale_deg)
-        while damping < 1e4:
-            damped = information + damping * np.diag(np.diag(information))
-            candidate = vector + np.clip(np.linalg.solve(damped, slope), -0.5, 0.5)
-            answer = posterior.angles_deg(candidate)
-            gain = posterior.height(candidate, answer, scale_deg) - height
-            if gain > 0.0:
-                break
-            damping *= 5.0
-        else:
-            break
-        vector, foretold, damping = candidate, answer, max(damping / 5.0, 1e-6)
-        scale_deg = posterior.readings.best_scale_deg(foretold, least_deg)
-        if gain < 0.05:
-            break
-    return _peak(posterior, vector, foretold, least_deg)
+def _limited(covariance: Array) -> Array:
+    """Return a covariance that is nowhere wider than the first ensemble's."""
+    information = np.linalg.inv(covariance) + _FIRST_SPREAD**-2.0 * np.eye(len(covariance))
+    result: Array = np.linalg.inv((information + information.T) / 2.0)
+    return result
 
 
-def _evolve(
-    posterior: Posterior, peak: Estimate, spread: Array, least_deg: float, generations: int, chance: np.random.Generator
-) -> tuple[Estimate, Array]:
-    """Return the best of some generations about a peak, and the covariance of the next."""
-    size = len(spread)
-    scale_deg = posterior.readings.best_scale_deg(peak.foretold_deg, least_deg)
+class _LinearPosterior(NamedTuple):
+    """The posterior with a linear model of the angles. A move shifts the constants by units, and the drift."""
 
-    def height(constants: Array) -> float:
-        return posterior.height(*posterior.with_drift(constants, peak.vector[size:], scale_deg), scale_deg)
+    posterior: Posterior
+    origin: Array
+    basis: Array  # vector = origin + basis @ move
+    still_deg: Array
+    slopes: Array  # angles = still + slopes @ move
+    residual: Array = np.empty((0, 0))  # (members, readings), what the linear model leaves out
 
-    summit = climb(height, peak.vector[:size], spread, _POPULATION, generations, chance)
-    vector, foretold = posterior.with_drift(summit.best, peak.vector[size:], scale_deg)
-    return _peak(posterior, vector, foretold, least_deg), summit.covariance
+    @classmethod
+    def of(cls, posterior: Posterior, ensemble: Ensemble, drift: Array) -> "_LinearPosterior":
+        linear = regressed(ensemble)
+        return cls(
+            posterior,
+            np.concatenate([ensemble.center, drift]),
+            block_diag(ensemble.root, np.eye(len(drift))),
+            linear.mean + posterior.drift @ drift,
+            np.hstack([linear.slopes, posterior.drift]),
+            linear.residual,
+        )
 
+    def height(self, move: Array, scale_deg: float) -> float:
+        return self.posterior.height(self.origin + self.basis @ move, self.still_deg + self.slopes @ move, scale_deg)
 
-def _peak(posterior: Posterior, vector: Array, foretold_deg: Array, least_deg: float) -> Estimate:
-    scale_deg = posterior.readings.best_scale_deg(foretold_deg, least_deg)
-    height = posterior.height(vector, foretold_deg, scale_deg)
-    return Estimate(vector, np.empty((0, 0)), height, scale_deg, foretold_deg)
+    def information(self, move: Array, scale_deg: float) -> Array:
+        """Return the likelihood's negative Hessian."""
+        _, weight = self.posterior.readings.derivatives(self.still_deg + self.slopes @ move, scale_deg)
+        result: Array = self.slopes.T @ (self.slopes * weight[:, None])
+        return result
 
+    def measured_information(self, scale_deg: float) -> tuple[Array, Array]:
+        """Return the likelihood's negative Hessian, and the variance of its slope by what the linear model leaves out.
 
-def _with_covariance(posterior: Posterior, peak: Estimate, sharpest_deg: float) -> Estimate:
-    """Return the peak with the covariance about it; long differences see past the ruggedness."""
-    jacobian = posterior.jacobian(peak.vector, _CONFIDENCE_STRIDE)
-    information = posterior.information(jacobian, peak.foretold_deg, max(peak.scale_deg, sharpest_deg))
-    return peak._replace(covariance=np.linalg.inv(information).astype(np.float64))
+        The residual also adds noise to the slopes of the linear model. The information that this noise seems to give
+        is subtracted.
+        """
+        _, weight = self.posterior.readings.derivatives(self.still_deg, scale_deg)
+        members, size = len(self.residual), self.posterior.size
+        information = self.information(np.zeros(self.basis.shape[1]), scale_deg)
+        variance = np.sum(self.residual**2, axis=0) / max(members - size - 1, 1)
+        noise = float(np.sum(weight * variance)) / members
+        values, axes = np.linalg.eigh(information[:size, :size])
+        lost = np.minimum(noise, (1.0 - _LEAST_INFORMATION) * np.maximum(values, 0.0))
+        information[:size, :size] -= (axes * lost) @ axes.T
+        slopes = (self.residual * weight) @ self.slopes
+        spurious: Array = slopes.T @ slopes / max(members - size - 1, 1)
+        return information, spurious
+
+    def prior_information(self) -> Array:
+        result: Array = self.basis.T @ self.basis
+        return result
+
+    def maximum(self, scale_deg: float, reachable: Array, rounds: int, enough: float) -> Array:
+        """Return the best move within bounds, by Newton's method with Levenberg's damping."""
+        move, damping = np.zeros(self.basis.shape[1]), 1e-4
+        height = self.height(move, scale_deg)
+        for _ in range(rounds):
+            slope, _ = self.posterior.readings.derivatives(self.still_deg + self.slopes @ move, scale_deg)
+            rise = self.slopes.T @ slope - self.basis.T @ (self.origin + self.basis @ move)
+            information = self.information(move, scale_deg) + self.prior_information()
+            while damping < 1e5:
+                damped = information + damping * np.diag(np.diag(information))
+                candidate = np.clip(move + np.linalg.solve(damped, rise), -reachable, reachable)
+                gain = self.height(candidate, scale_deg) - height
+                if gain > 0.0:
+                    break
+                damping *= 6.0
+            else:
+                return move
+            move, height, damping = candidate, height + gain, max(damping / 6.0, 1e-6)
+            if gain < enough:
+                return move
+        return move

@@ -6,7 +6,8 @@ from matplotlib.figure import Figure
 from emulator.config import TableConfig
 from tools.config_file import config_toml
 from tools.html_report import BLUE, ORANGE, figure_block, heading, new_figure, page, paragraph, svg_of, table_block
-from tools.identification.identify_table import Constant, Identified
+from tools.identification.constants import Constant
+from tools.identification.identify_table import Identified
 from tools.identification.parameters import PARAMETERS
 
 _GAP_S = 0.5
@@ -16,7 +17,7 @@ _GAP_S = 0.5
 def verdict(constant: Constant) -> str:
     """Return a constant with its interval in one line."""
     line = f"{constant.name}: {constant.value:.4g} ({constant.low:.4g} .. {constant.high:.4g}) {constant.unit}"
-    return line if constant.told else f"{line}  [not told by this recording: mostly what was assumed]"
+    return line if constant.identifiable else f"{line}  [not told by this recording: mostly what was assumed]"
 
 
 def table_toml(found: Identified) -> str:
@@ -34,11 +35,11 @@ def fit_report(found: Identified, assumed: TableConfig, source: str) -> str:
             f"{constant.name}, {constant.unit}",
             f"{constant.value:.4g}",
             f"{constant.low:.4g} .. {constant.high:.4g}",
-            "+told" if constant.told else "not told",
+            "+told" if constant.identifiable else "not told",
         )
         for constant in found.constants
     ]
-    untold = [constant.name for constant in found.constants if not constant.told]
+    untold = [constant.name for constant in found.constants if not constant.identifiable]
     return page(
         "Identified table",
         [
@@ -60,7 +61,7 @@ def fit_report(found: Identified, assumed: TableConfig, source: str) -> str:
             heading("The fit"),
             figure_block(
                 svg_of(_fit_figure(found)),
-                "Recorded and foretold, and how far the foretold angles are outside what the readings tell.",
+                "Recorded and predicted, and how far the predicted angles are outside what the readings tell.",
             ),
         ],
     )
@@ -69,11 +70,11 @@ def fit_report(found: Identified, assumed: TableConfig, source: str) -> str:
 def _fit_figure(found: Identified) -> Figure:
     figure = new_figure(10.5, 5.2, rows=2)
     top, bottom = figure.axes
-    time_s, seen_deg, foretold_deg = found.time_s, found.seen_deg, found.foretold_deg
+    time_s, seen_deg, predicted_deg = found.time_s, found.seen_deg, found.predicted_deg
     after_gap = np.diff(time_s, prepend=time_s[0]) > _GAP_S
-    seen_deg, foretold_deg = (np.where(after_gap, np.nan, angle_deg) for angle_deg in (seen_deg, foretold_deg))
+    seen_deg, predicted_deg = (np.where(after_gap, np.nan, angle_deg) for angle_deg in (seen_deg, predicted_deg))
     top.plot(time_s, seen_deg, color=ORANGE, linewidth=2.4, label="recorded")
-    top.plot(time_s, foretold_deg, color=BLUE, linewidth=1.0, label="foretold")
+    top.plot(time_s, predicted_deg, color=BLUE, linewidth=1.0, label="predicted")
     top.set_title("Compared")
     top.set_ylabel("deg")
     top.legend(loc="upper right")

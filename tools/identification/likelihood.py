@@ -1,9 +1,9 @@
-"""The likelihood of quantised readings: each tells an interval in which the angle lay.
+"""The likelihood of quantized readings: each reading is an interval that contained the angle.
 
-What the model does not foretell is taken to be logistic, of scale s: the probability of a reading is F((high - x)/s) -
-F((low - x)/s), with F the logistic function and x the foretold angle. So a reading counts by where in its interval the
-angle is foretold, which tells far more than its rounding error suggests, and a wild one counts no more than linearly.
-The logarithm is concave in x, and slope and curvature are simple.
+The prediction error is taken as logistic with scale s: a reading has the probability F((high - x)/s) - F((low - x)/s),
+with F the logistic function and x the predicted angle. A reading near the edge of its interval constrains the angle far
+more than the width of the interval suggests. An outlier counts linearly only. The logarithm is concave in x, and its
+derivatives are simple.
 """
 
 from typing import NamedTuple
@@ -21,21 +21,18 @@ class Intervals(NamedTuple):
     high_deg: Array
 
     def log_likelihood(self, angle_deg: Array, scale_deg: float) -> float:
-        """Return the logarithm of the probability of all readings, for foretold angles."""
-        below = np.logaddexp(0.0, (angle_deg - self.high_deg) / scale_deg)
-        above = np.logaddexp(0.0, (self.low_deg - angle_deg) / scale_deg)
+        """Return the logarithm of the probability of all readings, for predicted angles."""
+        above, below = self._outside(angle_deg, scale_deg)
         width = (self.high_deg - self.low_deg) / scale_deg
-        return float(np.sum(np.log(-np.expm1(-width)) - below - above))
+        return float(np.sum(np.log(-np.expm1(-width)) - _softplus(above) - _softplus(below)))
 
-    def slope(self, angle_deg: Array, scale_deg: float) -> Array:
-        """Return the derivative of each reading's part by its foretold angle."""
-        low, high = self._at_ends(angle_deg, scale_deg)
-        return (low + high - 1.0) / scale_deg
+    def derivatives(self, angle_deg: Array, scale_deg: float) -> tuple[Array, Array]:
+        """Return slope and negative curvature of each reading's logarithm by its predicted angle.
 
-    def curvature(self, angle_deg: Array, scale_deg: float) -> Array:
-        """Return the negative second derivative of each reading's part: its information about the angle."""
-        low, high = self._at_ends(angle_deg, scale_deg)
-        return (low * (1.0 - low) + high * (1.0 - high)) / scale_deg**2
+        The negative curvature is the reading's information about the angle.
+        """
+        above, below = (expit(distance) for distance in self._outside(angle_deg, scale_deg))
+        return (below - above) / scale_deg, (below * (1.0 - below) + above * (1.0 - above)) / scale_deg**2
 
     def best_scale_deg(self, angle_deg: Array, least_deg: float) -> float:
         """Return the most likely scale, from a grid that begins at `least_deg`."""
@@ -46,5 +43,12 @@ class Intervals(NamedTuple):
         """Return how far angles are above (or, negative, below) the intervals."""
         return angle_deg - np.clip(angle_deg, self.low_deg, self.high_deg)
 
-    def _at_ends(self, angle_deg: Array, scale_deg: float) -> tuple[Array, Array]:
-        return expit((self.low_deg - angle_deg) / scale_deg), expit((self.high_deg - angle_deg) / scale_deg)
+    def _outside(self, angle_deg: Array, scale_deg: float) -> tuple[Array, Array]:
+        """Return the signed distances above the upper and below the lower edges, in scales."""
+        return (angle_deg - self.high_deg) / scale_deg, (self.low_deg - angle_deg) / scale_deg
+
+
+def _softplus(x: Array) -> Array:
+    """Return log(1 + exp(x)) without overflow."""
+    positive: Array = np.maximum(x, 0.0) + np.log1p(np.exp(-np.abs(x)))
+    return positive

@@ -20,7 +20,6 @@ class Parameter(NamedTuple):
     spread: float
     least: float = 1e-12
     most: float = 1e12
-    step: float = 0.02  # of the logarithm, by which derivatives are taken: long for what shows little
 
     def value(self, config: TableConfig) -> float:
         """Return the constant's value in a configuration."""
@@ -38,16 +37,16 @@ class Parameter(NamedTuple):
 
 
 PARAMETERS = (
-    Parameter("motor", "torque_constant_Nm_A", 1.0),
-    Parameter("table", "inertia_kg_m2", 1.0),
+    Parameter("motor", "torque_constant_Nm_A", 0.8),
+    Parameter("table", "inertia_kg_m2", 1.2),
     Parameter("friction", "coulomb_Nm", 1.0, least=1e-6),
     Parameter("gears", "backlash_arcmin", 1.5, least=0.05),
-    Parameter("friction", "stiction_ratio", 0.15, least=1.0),
-    Parameter("friction", "stribeck_speed_rad_s", 0.3, step=0.05),
-    Parameter("motor", "rotor_inertia_kg_m2", 0.12),
-    Parameter("gears", "efficiency", 0.1, most=1.0),
-    Parameter("table", "bearing_friction_Nm", 0.3, least=1e-4),
-    Parameter("friction", "viscous_Nm_s", 0.7, least=1e-9, step=0.1),
+    Parameter("friction", "stiction_ratio", 0.2, least=1.0),
+    Parameter("friction", "stribeck_speed_rad_s", 0.4),
+    Parameter("motor", "rotor_inertia_kg_m2", 0.2),
+    Parameter("gears", "efficiency", 0.15, most=1.0),
+    Parameter("table", "bearing_friction_Nm", 0.4, least=1e-4),
+    Parameter("friction", "viscous_Nm_s", 1.3, least=1e-9),
 )
 
 BACKLASH = 3

@@ -9,9 +9,12 @@ Over the wire (`WireRecording`), a CSV file with the columns
 
 From a drive (`DriveRecording`), or from the emulator's own trace, a CSV file that has among its columns `time_s`,
 `duty` (-1..1) and `position_deg` or `encoder_deg`.
+
+The names of the columns and commands may be in upper or lower case, the separator a comma, a semicolon or a tab.
 """
 
 import csv
+from itertools import pairwise
 from math import nan
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +23,8 @@ import numpy as np
 
 from planner.whole_file import whole_file
 from tools.emulated import Array
+from tools.identification.csv_table import Row, Table, check_decimals, read_table
+from tools.identification.errors import RecordingError
 
 BITS_A_BYTE = 10
 """On the line: a start bit, eight of data, a stop bit."""
@@ -27,10 +32,6 @@ BITS_A_BYTE = 10
 COLUMNS = ("time_s", "command", "position_deg")
 _REPLY = "reply_s"
 _MOST_DECIMALS = 6
-
-
-class RecordingError(ValueError):
-    """A recording that cannot be used; the message names the place and what is wrong with it."""
 
 
 class Sent(NamedTuple):
@@ -82,56 +83,60 @@ def write_recording(path: Path, recording: WireRecording) -> None:
 
 
 def read_recording(path: Path) -> WireRecording | DriveRecording:
-    """Return the recording in a CSV file, of whichever kind it is.
+    """Return the recording in a CSV file, of whichever kind it is. A row that is an exact copy of another counts once.
 
     Raises:
-        RecordingError: The file is neither, or a row cannot be read.
+        RecordingError: The file is neither, a row cannot be read, or the rows are not in the order of their times.
         OSError: The file cannot be opened.
     """
-    try:
-        with path.open(encoding="ascii", newline="") as file:
-            reader = csv.DictReader(file)
-            names, rows = reader.fieldnames or [], list(reader)
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise RecordingError(f"{path}: is not a CSV file: {error}") from error
-    if set(COLUMNS) <= set(names):
-        return _wire(path, rows)
-    position = next((name for name in ("position_deg", "encoder_deg") if name in names), None)
-    if position and {"time_s", "duty"} <= set(names):
-        columns = [_numbers(path, rows, name) for name in ("time_s", "duty", position)]
-        return DriveRecording(*columns)
+    table = read_table(path)
+    if table.has(COLUMNS):
+        check_decimals(table, (*COLUMNS, _REPLY))
+        return _wire(_in_order(table))
+    position = next((name for name in ("position_deg", "encoder_deg") if table.has([name])), None)
+    if position and table.has(["time_s", "duty"]):
+        names = ("time_s", "duty", position)
+        check_decimals(table, names)
+        table = _in_order(table)
+        columns = ([table.number(row, name, row.cells[name]) for row in table.rows] for name in names)
+        return DriveRecording(*map(np.array, columns))
     raise RecordingError(
-        f"{path}: has the columns {', '.join(names) or '(none)'}; needed are {', '.join(COLUMNS)} (over the wire), "
-        "or time_s, duty and position_deg or encoder_deg (from a drive)"
+        f"{path}: has the columns {', '.join(table.names) or '(none)'}; needed are {', '.join(COLUMNS)} "
+        "(over the wire), or time_s, duty and position_deg or encoder_deg (from a drive)"
     )
 
 
-def _wire(path: Path, rows: list[dict[str, str]]) -> WireRecording:
+def _in_order(table: Table) -> Table:
+    """Return the table without the copies of rows; refuse rows that are not in the order of their times."""
+    distinct: dict[tuple[str, ...], Row] = {}
+    for row in table.rows:
+        distinct.setdefault(tuple(row.cells.values()), row)
+    rows = tuple(distinct.values())
+    times = [table.number(row, "time_s", row.cells["time_s"]) for row in rows]
+    back = [index for index, (before, after) in enumerate(pairwise(times), start=1) if after < before]
+    if back:
+        first = back[0]
+        raise table.error(
+            rows[first],
+            f"time_s goes back from {times[first - 1]:g} to {times[first]:g} s, the first of {len(back)} such places; "
+            "the rows must be in the order of their times, and the clock must not be set meanwhile",
+        )
+    return table._replace(rows=rows)
+
+
+def _wire(table: Table) -> WireRecording:
     commands, times, positions, replies = [], [], [], []
-    for line, row in enumerate(rows, start=2):
-        verb, _, value = (row["command"] or "").partition(" ")
-        if verb not in set("HPRSA"):
-            raise RecordingError(f"{path}: line {line}: the command is {row['command']!r}; it must be H, P, R, S or A")
-        time_s = _number(path, line, "time_s", row["time_s"])
-        reply_s = _number(path, line, _REPLY, row[_REPLY]) if _REPLY in row else nan
+    for row in table.rows:
+        command = row.cells["command"]
+        verb, value = command[:1].upper(), command[1:].strip()
+        if verb not in set("HPRSA") or (verb == "H" and value):
+            raise table.error(row, f"the command is {command!r}; it must be H, P, R, S or A")
+        time_s = table.number(row, "time_s", row.cells["time_s"])
+        reply_s = table.number(row, _REPLY, row.cells[_REPLY]) if _REPLY in row.cells else nan
         if verb == "H":
             times.append(time_s)
             replies.append(reply_s)
-            positions.append(_number(path, line, "position_deg", row["position_deg"]))
+            positions.append(table.number(row, "position_deg", row.cells["position_deg"]))
         else:
-            commands.append(Sent(time_s, verb, _number(path, line, "command", value), reply_s))
+            commands.append(Sent(time_s, verb, table.number(row, "command", value), reply_s))
     return WireRecording(tuple(commands), np.array(times), np.array(positions), np.array(replies))
-
-
-def _numbers(path: Path, rows: list[dict[str, str]], name: str) -> Array:
-    return np.array([_number(path, line, name, row[name]) for line, row in enumerate(rows, start=2)])
-
-
-def _number(path: Path, line: int, name: str, text: str | None) -> float:
-    try:
-        value = float(text or "")
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise RecordingError(f"{path}: line {line}: {name} is {text!r}; it must be a number")
-    return value

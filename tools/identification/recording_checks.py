@@ -4,7 +4,8 @@ import numpy as np
 
 from emulator.config import TableConfig
 from tools.emulated import Array
-from tools.identification.recording import DriveRecording, RecordingError, WireRecording
+from tools.identification.errors import RecordingError
+from tools.identification.recording import BITS_A_BYTE, DriveRecording, WireRecording
 from tools.identification.simulation import commanded_motions, ticks_of, wire_positions_deg
 from tools.identification.timing import timing
 
@@ -14,6 +15,10 @@ LONGEST_GAP_S = 0.5
 _LEAST_TRAVEL_DEG = 5.0
 _STALL_S = 1.0
 _STRAY_DEG = 3.0
+_UNSENT_S, _AT_REST_DEG = 0.3, 0.2
+"""For how long, and within which range, the prediction rests when the table moves without a command."""
+_SHORTEST_REPLY = len("OK\r")
+_OVERLAP_S = 1e-3
 
 
 def check_recording(config: TableConfig, recording: WireRecording | DriveRecording) -> None:
@@ -77,41 +82,75 @@ def _check_speeds(config: TableConfig, time_s: Array, position_deg: Array) -> No
 
 
 def _check_against_commands(config: TableConfig, recording: WireRecording) -> None:
-    _check_gaps(recording.time_s)
     if not any(sent.verb in "PR" for sent in recording.commands):
         raise RecordingError(
             "the recording has no P or R command; the duty follows from the commands, so they are needed"
         )
     at = timing(config, recording)
-    foretold = wire_positions_deg(config, commanded_motions(config, recording, at.commands), at.readings)
+    if at.fault:
+        raise RecordingError(at.fault)
+    _check_dialogue(config, recording)
+    _check_gaps(recording.time_s)
+    predicted = wire_positions_deg(config, commanded_motions(config, recording, at.commands), at.readings)
     seen = recording.position_deg - recording.position_deg[0]
-    _check_stall(recording.time_s, seen, foretold)
-    ratio = float(np.ptp(seen) / max(np.ptp(foretold), 1e-9))
-    stray = np.abs(seen - foretold)
-    if stray.max() > _STRAY_DEG:
-        first = int(np.argmax(stray > _STRAY_DEG))
+    faults = [_stall(recording.time_s, seen, predicted), _stray(recording.time_s, seen, predicted)]
+    found = sorted(fault for fault in faults if fault)
+    if found:
+        raise RecordingError(found[0][1])
+
+
+def _check_dialogue(config: TableConfig, recording: WireRecording) -> None:
+    """Refuse lines that were sent before the previous reply was complete: no client of the table does that."""
+    sent = np.concatenate([recording.time_s, [sent.time_s for sent in recording.commands]])
+    replied = np.concatenate([recording.reply_s, [sent.reply_s for sent in recording.commands]])
+    order = np.argsort(sent, kind="stable")
+    sent, replied = sent[order], replied[order]
+    if not np.isfinite(replied).all():
+        baud = config.serial.baud
+        replied = sent + (_SHORTEST_REPLY * BITS_A_BYTE / baud if baud else 0.0)
+    early_s = replied[:-1] - sent[1:]
+    if early_s.max() > _OVERLAP_S or (np.diff(sent) <= 0.0).any():
+        at = int(np.argmax(np.where(np.diff(sent) <= 0.0, np.inf, early_s)))
         raise RecordingError(
-            f"from {recording.time_s[first]:.2f} s on the table is not where its commands send it "
-            f"(travel {ratio:.3g} times as far): wrong units, a step of the clock, lost commands, "
-            "or other gears and encoder than configured"
+            f"the line at {sent[at + 1]:.3f} s was sent before the reply to the line at {sent[at]:.3f} s was complete: "
+            "readings are doubled, rows are mixed up, the clock was set back, or serial.baud differs"
         )
-    if not at.exact:
+    if (replied < sent).any():
         raise RecordingError(
-            "the replies do not come at the table's ticks, so the times are not known well enough: something on the "
-            "line gathers bytes (the latency timer of a USB adapter?), or control.tick_hz is another"
+            f"the reply to the line at {sent[np.argmax(replied < sent)]:.3f} s came before it: the columns are mixed up"
         )
 
 
-def _check_stall(time_s: Array, seen_deg: Array, foretold_deg: Array) -> None:
+_Fault = tuple[float, str]
+"""When it began, and what it is."""
+
+
+def _stall(time_s: Array, seen_deg: Array, predicted_deg: Array) -> _Fault | None:
     before = np.searchsorted(time_s, time_s - _STALL_S)
     stands = np.abs(seen_deg - seen_deg[before]) < 1e-9
-    should_move = np.abs(foretold_deg - foretold_deg[before]) > 1.0
+    should_move = np.abs(predicted_deg - predicted_deg[before]) > 1.0
     stalled = stands & should_move & (time_s - time_s[0] > _STALL_S)
-    if stalled.any():
-        at = int(np.argmax(stalled))
-        raise RecordingError(
-            f"the table stands still for {_STALL_S:g} s before {time_s[at]:.2f} s though it was sent: a stall"
+    if not stalled.any():
+        return None
+    at = float(time_s[np.argmax(stalled)])
+    return at - _STALL_S, f"the table stands still for {_STALL_S:g} s before {at:.2f} s though it was sent: a stall"
+
+
+def _stray(time_s: Array, seen_deg: Array, predicted_deg: Array) -> _Fault | None:
+    stray = np.abs(seen_deg - predicted_deg) > _STRAY_DEG
+    if not stray.any():
+        return None
+    first = int(np.argmax(stray))
+    at, begin = float(time_s[first]), int(np.searchsorted(time_s, time_s[first] - _UNSENT_S))
+    if np.ptp(predicted_deg[begin : first + 1]) < _AT_REST_DEG:
+        reason = "it moves though no command sends it: a P or R command is missing, or the table was turned by hand"
+    else:
+        ratio = float(np.ptp(seen_deg) / max(np.ptp(predicted_deg), 1e-9))
+        reason = (
+            f"it travels {ratio:.3g} times as far: wrong units, a step of the clock, a missing command, "
+            "or other gears and encoder than configured"
         )
+    return at - _UNSENT_S, f"from {at:.2f} s on the table is not where its commands send it; {reason}"
 
 
 def _check_duty(config: TableConfig, recording: DriveRecording) -> None:

@@ -13,12 +13,7 @@ from numpy.typing import NDArray
 from emulator.config import TableConfig
 from tools.emulated import Array
 from tools.identification.recording import BITS_A_BYTE, WireRecording
-
-_GRID = 0.5
-"""How much of the replies' phase within a tick is common to them, at least, if they come on a grid: 0..1."""
-
-_CLOCK_RATES = 1e-6 * np.arange(-200.0, 201.0)
-"""By how much the recorder's clock may run faster than the table's."""
+from tools.identification.reply_grid import reply_grid
 
 _DOUBTFUL_TICKS = 0.8
 """How much later than most a reply may come."""
@@ -27,7 +22,7 @@ _DOUBTFUL_TICKS = 0.8
 class Timing(NamedTuple):
     """The ticks at whose end lines were carried out, and which of them are in doubt."""
 
-    exact: bool  # but for lines in doubt; otherwise the replies come on no grid, and tell no tick
+    fault: str  # why the ticks are not known, in one sentence, or empty
     readings: Array  # (readings,)
     commands: Array  # (commands,)
     doubtful_readings: NDArray[np.bool_]
@@ -39,20 +34,17 @@ def timing(config: TableConfig, recording: WireRecording) -> Timing:
     tick_hz, count = config.control.tick_hz, len(recording.time_s)
     sent = tick_hz * np.concatenate([recording.time_s, [sent.time_s for sent in recording.commands]])
     soonest = np.ceil(sent - 1e-3)
-    latest = tick_hz * np.concatenate([recording.reply_s, [sent.reply_s for sent in recording.commands]])
-    latest -= _reply_ticks(config, recording)
-    if not np.isfinite(latest).all():
+    arrived = tick_hz * np.concatenate([recording.reply_s, [sent.reply_s for sent in recording.commands]])
+    if not np.isfinite(arrived).all():
         sure = np.zeros(len(sent), dtype=bool)
-        return Timing(True, soonest[:count], soonest[count:], sure[:count], sure[count:])
-    phases = [np.mean(np.exp(2j * np.pi * latest[:count] * (1.0 - rate))) for rate in _CLOCK_RATES]
-    best = int(np.argmax(np.abs(phases)))
-    on_grid = bool(abs(phases[best]) > _GRID)
-    on_table = latest * (1.0 - _CLOCK_RATES[best]) - np.angle(phases[best]) / (2.0 * np.pi)
-    tick = np.round(on_table) if on_grid else soonest
+        return Timing("", soonest[:count], soonest[count:], sure[:count], sure[count:])
+    latest = arrived - _reply_ticks(config, recording)
+    grid = reply_grid(arrived[:count], latest[:count])
+    tick = soonest if grid.fault else np.round(grid.ticks(latest))
     margin = latest - sent
     usual = np.quantile(margin[:count], 0.1)
     doubtful = margin > max(usual + _DOUBTFUL_TICKS, float(np.median(margin[:count])))
-    return Timing(on_grid, tick[:count], tick[count:], doubtful[:count], doubtful[count:])
+    return Timing(grid.fault, tick[:count], tick[count:], doubtful[:count], doubtful[count:])
 
 
 def _reply_ticks(config: TableConfig, recording: WireRecording) -> Array:

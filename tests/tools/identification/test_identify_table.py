@@ -7,8 +7,9 @@ from emulator.config import TableConfig, load_config
 from protocol.client import TableClient
 from tools.bench.identify import write_plant
 from tools.emulated import Motion, emulate
+from tools.identification.constants import Constant, coulomb_Nm
 from tools.identification.excitation import excitation
-from tools.identification.identify_table import Constant, Identified, coulomb_Nm, identify
+from tools.identification.identify_table import Identified, identify
 from tools.identification.recorder import record
 from tools.identification.recording import DriveRecording, WireRecording
 from tools.identification.recording_checks import check_recording
@@ -30,7 +31,7 @@ def test_a_minute_over_the_wire_tells_the_constants_of_a_table_that_it_has_not_s
     found = identify(assumed, recording)
 
     assert_within_bounds(found, load_config(unseen))
-    told = {constant.name for constant in found.constants if constant.told}
+    told = {constant.name for constant in found.constants if constant.identifiable}
     assert {"gain", "time constant", "Coulomb friction", "backlash"} <= told
     assert "delay" not in told  # the line delays commands and readings alike
 
@@ -73,4 +74,4 @@ def test_a_drives_duty_tells_the_constants_more_sharply(assumed: TableConfig, un
     assert constants["Coulomb friction"].value == pytest.approx(1e3 * coulomb_Nm(truth), rel=0.05)
     assert constants["backlash"].value == pytest.approx(truth.gears.backlash_arcmin, rel=0.1)
     assert constants["delay"].value == pytest.approx(1.0, abs=0.25)  # the PWM's buffer
-    assert constants["delay"].told
+    assert constants["delay"].identifiable

@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tools.identification.errors import RecordingError
 from tools.identification.recording import (
     DriveRecording,
-    RecordingError,
     WireRecording,
     read_recording,
     write_recording,

@@ -1,0 +1,103 @@
+"""The constants of a table that are reported, with their intervals, and whether a recording identifies them."""
+
+from collections.abc import Callable
+from math import exp, log
+from typing import NamedTuple
+
+import numpy as np
+
+from emulator.config import TableConfig
+from tools.emulated import Array
+from tools.identification.estimation import Estimate
+from tools.identification.parameters import PARAMETERS, with_logarithms
+from tools.tuning.linear_model import Teeth, load_ratio, speed_gain_deg_s, time_constant_s
+
+_SURE_95 = 1.96
+
+_DOUBTED_PRIOR = 3.0
+_IDENTIFIABLE_DEVIATION = 0.25
+"""A constant is identifiable if its logarithm is known to this standard deviation even with a prior three times as
+wide: then the recording determines it, and not the prior."""
+
+
+class Constant(NamedTuple):
+    """An estimated constant with its 95 % confidence interval, and whether the recording alone determines it."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    identifiable: bool
+
+
+_Derived = Callable[[TableConfig], float]
+
+
+def coulomb_Nm(config: TableConfig) -> float:
+    """Return the Coulomb friction of a driven table at the motor's shaft, its bearing's share with it."""
+    return config.friction.coulomb_Nm + config.table.bearing_friction_Nm * load_ratio(config, Teeth.DRIVING)
+
+
+def coulomb_duty(config: TableConfig) -> float:
+    """Return the duty that the Coulomb friction takes."""
+    motor = config.motor
+    return coulomb_Nm(config) * motor.resistance_ohm / motor.torque_constant_Nm_A / config.driver.supply_V
+
+
+DERIVED: tuple[tuple[str, str, _Derived], ...] = (
+    ("gain", "deg/s at full duty", speed_gain_deg_s),
+    ("time constant", "ms, loaded", lambda config: 1e3 * time_constant_s(config, Teeth.DRIVING)),
+    ("time constant, free", "ms, within the backlash", lambda config: 1e3 * time_constant_s(config, Teeth.FREE)),
+    ("Coulomb friction", "mNm at the motor, loaded", lambda config: 1e3 * coulomb_Nm(config)),
+    ("Coulomb friction as duty", "%", lambda config: 100.0 * coulomb_duty(config)),
+    ("stiction", "times the Coulomb friction", lambda config: config.friction.stiction_ratio),
+    ("viscous friction", "uNm s", lambda config: 1e6 * config.friction.viscous_Nm_s),
+    ("backlash", "arcmin", lambda config: config.gears.backlash_arcmin),
+)
+
+
+def constants_of(config: TableConfig, found: Estimate, deviation: Array, from_drive: bool) -> tuple[Constant, ...]:
+    """Return the reported constants, by linear propagation of the covariance.
+
+    Args:
+        config: What was known beforehand.
+        found: The estimate, in the units of the parameters.
+        deviation: (components,) the standard deviations that the prior has.
+        from_drive: Whether the delay is one of a drive.
+    """
+    size = len(PARAMETERS)
+    doubting = deviation.copy()
+    doubting[:size] *= _DOUBTED_PRIOR
+    doubted = np.linalg.inv(found.likelihood_information + np.diag(doubting**-2.0))
+    result = []
+    for name, unit, function in DERIVED:
+        slope = np.zeros(len(found.vector))
+        slope[:size] = _log_slope(config, found.vector[:size], function)
+        after, alone = (float(np.sqrt(slope @ spread @ slope)) for spread in (found.covariance, doubted))
+        value = function(with_logarithms(config, found.vector[:size]))
+        factor = exp(min(_SURE_95 * after, 50.0))
+        identifiable = max(after, alone) < _IDENTIFIABLE_DEVIATION
+        result.append(Constant(name, unit, value, value / factor, value * factor, identifiable))
+    return (*result, _delay(found, float(deviation[size]), from_drive))
+
+
+def _delay(found: Estimate, prior: float, from_drive: bool) -> Constant:
+    size = len(PARAMETERS)
+    after, delay = float(np.sqrt(found.covariance[size, size])), float(found.vector[size])
+    unit, scale = ("ticks, duty to bridge", 1.0) if from_drive else ("ms, reading behind command", 1e3)
+    spread = _SURE_95 * after
+    return Constant(
+        "delay", unit, scale * delay, scale * (delay - spread), scale * (delay + spread), bool(after < 0.5 * prior)
+    )
+
+
+def _log_slope(config: TableConfig, logarithms: Array, function: _Derived) -> Array:
+    step = 1e-4
+    slopes = []
+    for index in range(len(logarithms)):
+        shift = np.zeros_like(logarithms)
+        shift[index] = step
+        ends = [function(with_logarithms(config, logarithms + sign * shift)) for sign in (1.0, -1.0)]
+        slopes.append((log(ends[0]) - log(ends[1])) / (2.0 * step))
+    return np.array(slopes)

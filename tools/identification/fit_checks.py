@@ -1,0 +1,61 @@
+"""Whether a fit is to be believed: the model must explain the readings, and the motor should be the configured one."""
+
+from math import log, pi
+
+import numpy as np
+
+from emulator.config import TableConfig
+from tools.identification.errors import RecordingError
+from tools.identification.identify_table import Identified
+
+MOST_UNEXPLAINED_DEG = 1e-3
+"""The root mean square beyond rounding that a good recording stays below."""
+
+_STRIPES = 30
+_WHOLE = 0.5
+"""Errors in at least this share of the recording are said to be everywhere."""
+
+_AT_ODDS = log(1.25)
+"""A torque constant differs from its datasheet by a tenth; by a quarter it is another motor."""
+
+
+def check_fit(found: Identified) -> None:
+    """Refuse a fit that does not explain its recording.
+
+    Raises:
+        RecordingError: What is left unexplained is more than rounding.
+    """
+    left = found.unexplained_deg
+    rms_deg = float(np.sqrt(np.mean(left**2)))
+    if rms_deg <= MOST_UNEXPLAINED_DEG:
+        return
+    raise RecordingError(
+        f"the model does not explain the recording: beyond rounding {rms_deg:.2g} deg rms are left "
+        f"(allowed {MOST_UNEXPLAINED_DEG:g}), {_where(found)}; a step or drift of the clock, a changed load or table, "
+        "a table that was turned by hand, an encoder that lost counts, or other gains, gears or encoder than configured"
+    )
+
+
+def _where(found: Identified) -> str:
+    """Return where the recording differs most from the model."""
+    time_s = found.time_s
+    edges = np.linspace(time_s[0], time_s[-1], _STRIPES + 1)
+    stripe = np.clip(np.searchsorted(edges, time_s, side="right") - 1, 0, _STRIPES - 1)
+    power = np.bincount(stripe, found.unexplained_deg**2, _STRIPES)
+    bad = np.flatnonzero(power > power.max() / 10.0)
+    if len(bad) > _WHOLE * _STRIPES:
+        return "all over it"
+    return f"most of them from {edges[bad[0]]:.0f} to {edges[bad[-1] + 1]:.0f} s"
+
+
+def motor_at_odds(found: Identified, assumed: TableConfig) -> str:
+    """Return in a sentence how the motor found differs from the configured one, or nothing if it does not."""
+    before, after = assumed.motor.torque_constant_Nm_A, found.config.motor.torque_constant_Nm_A
+    if abs(log(after / before)) <= _AT_ODDS:
+        return ""
+    no_load = [assumed.driver.supply_V / constant * 30.0 / pi for constant in (after, before)]
+    return (
+        f"the motor's torque constant comes out as {1e3 * after:.3g} mNm/A (no-load speed {no_load[0]:.0f} rpm), but "
+        f"{1e3 * before:.3g} mNm/A ({no_load[1]:.0f} rpm) is configured; check motor, supply, gear ratio, encoder and "
+        "gains in --config: torques and inertias are wrong if one of them is"
+    )

@@ -1,0 +1,101 @@
+"""The grid on which replies come: a table that answers at its ticks shows them to the recorder.
+
+The phase of the replies within a tick is common to all, but for the rates of the two clocks. Where it is not, something
+between the table and the recorder delays replies at random. Where all replies come on a coarser grid, something gathers
+them. In both cases the replies do not determine the ticks.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tools.emulated import Array
+
+_COMMON = 0.5
+"""Least share of the phase that is common to the replies of a grid: 0..1."""
+_LOCALLY_COMMON = 0.3
+"""The same within a window; a window with less (late replies, or few) takes its phase from its neighbors."""
+
+_BIN_PERIODS, _WINDOW_TICKS = 100.0, 2000.0
+_LEAST_IN_WINDOW = 20
+_MOST_RATE = 2.5e-3
+"""The greatest difference between the rates of the clocks."""
+_MOST_STEP = 0.2
+"""The greatest change of the phase from one window to the next, in ticks."""
+_COARSER = range(2, 65)
+
+
+class Grid(NamedTuple):
+    """The mapping from the recorder's clock to the table's ticks, and what is wrong with it."""
+
+    rate: float = 0.0  # by how much the recorder's clock runs faster than the table's
+    centers: Array = np.zeros(1)  # (windows,) times on the recorder's clock, in nominal ticks
+    phases: Array = np.zeros(1)  # (windows,) in ticks
+    fault: str = ""  # one sentence
+
+    def ticks(self, times: Array) -> Array:
+        """Return times on the recorder's clock (in nominal ticks) in the table's ticks; replies come at integers."""
+        result: Array = times * (1.0 - self.rate) - np.interp(times, self.centers, self.phases)
+        return result
+
+
+def reply_grid(arrived: Array, sent: Array) -> Grid:
+    """Return the grid of replies.
+
+    Args:
+        arrived: (replies,) when the replies were complete at the recorder, on its clock, in nominal ticks.
+        sent: (replies,) the same less the time that each reply took on the line.
+    """
+    for period in reversed(_COARSER):
+        if max(_strength(times / period)[0] for times in (arrived, sent)) > _COMMON:
+            return Grid(
+                fault=f"the replies come on a grid of {period} ticks of the table, too coarse to know the times: "
+                "something gathers bytes (the latency timer of a USB adapter?), the times are rounded, "
+                "or control.tick_hz differs"
+            )
+    strength, rate = _strength(sent)
+    if strength <= _LOCALLY_COMMON:
+        return Grid(
+            fault="the replies do not come at the table's ticks, so the times are not known: something on the line "
+            "gathers bytes (the latency timer of a USB adapter?), the recorder's clock runs unevenly, "
+            "or control.tick_hz differs"
+        )
+    return _tracked(sent, rate)
+
+
+def _strength(times: Array) -> tuple[float, float]:
+    """Return the share of the phase that is common, and the difference of the clocks' rates; times in grid periods."""
+    bins = np.floor(times / _BIN_PERIODS).astype(np.int64)
+    bins -= bins.min()
+    turned = np.exp(2j * np.pi * times)
+    sums = np.bincount(bins, turned.real) + 1j * np.bincount(bins, turned.imag)
+    size = 8 * len(sums)
+    spectrum, rates = np.abs(np.fft.fft(sums, size)), np.fft.fftfreq(size) / _BIN_PERIODS
+    spectrum[np.abs(rates) > _MOST_RATE] = 0.0
+    best = int(np.argmax(spectrum))
+    return float(spectrum[best] / len(times)), float(rates[best])
+
+
+def _tracked(sent: Array, rate: float) -> Grid:
+    """Follow the phase from window to window: clocks drift, and the phase of a clock that is set jumps."""
+    windows = np.floor((sent - sent.min()) / _WINDOW_TICKS).astype(np.int64)
+    turned = np.exp(2j * np.pi * sent * (1.0 - rate))
+    common = [
+        (float(sent[of_window].mean()), complex(turned[of_window].mean()))
+        for of_window in (windows == window for window in range(int(windows.max()) + 1))
+        if np.count_nonzero(of_window) >= _LEAST_IN_WINDOW
+    ]
+    strong = [(center, phasor) for center, phasor in common if abs(phasor) > _LOCALLY_COMMON]
+    if len(strong) < max(1.0, _COMMON * len(common)):
+        return Grid(fault="the recorder's clock runs unevenly: the replies keep no phase with the table's ticks")
+    centers = np.array([center for center, _ in strong])
+    phases = np.unwrap(np.angle([phasor for _, phasor in strong])) / (2.0 * np.pi)
+    steps = np.abs(np.diff(phases))
+    fault = ""
+    if len(steps) and steps.max() > _MOST_STEP:
+        at = int(np.argmax(steps))
+        fault = (
+            f"the recorder's clock jumps, or runs unevenly, between tick {centers[at]:.0f} and {centers[at + 1]:.0f}: "
+            f"the phase of the replies changes by {steps[at]:.2f} ticks"
+        )
+    return Grid(rate, centers, phases, fault)
