@@ -22,7 +22,7 @@ from tools.identification.fit_report import fit_report, table_toml, verdict
 from tools.identification.identify_table import identify
 from tools.identification.recorder import record
 from tools.identification.recording import read_recording, write_recording
-from tools.identification.recording_checks import LEAST_DURATION_S, check_recording
+from tools.identification.recording_checks import LEAST_DURATION_S, check_line, check_recording
 from tools.progress import Progress
 
 _LONGEST_S = 3600.0
@@ -48,9 +48,12 @@ def _record(options: argparse.Namespace) -> int:
             allowed = f"at least {least:g}" if most == inf else f"within {least:g} to {most:g}"
             raise RecordingError(f"--{name} is {value:g}; it must be {allowed}")
     check_writable(options.out)
+    config = load_config(options.config).with_serial(baud=options.baud)
     bursts = excitation(options.duration, options.speed, options.acceleration, options.seed)
     with TableClient.open(options.port, baud=options.baud) as client, Progress("recording") as progress:
-        recording = record(client, bursts, options.speed, options.baud, progress.show)
+        recording = record(
+            client, bursts, options.speed, options.baud, progress.show, lambda so_far: check_line(config, so_far)
+        )
     write_recording(options.out, recording)
     print(f"{options.out}: {len(recording.time_s)} readings, {len(recording.commands)} commands")
     return 0
@@ -114,6 +117,7 @@ def _parser() -> argparse.ArgumentParser:
     recorder.add_argument(
         "--acceleration", type=float, default=100.0, metavar="DEG_S2", help="the greatest to use (100)"
     )
+    recorder.add_argument("--config", type=Path, help="what is known of the table: the tick of its controller")
     recorder.add_argument("--seed", type=int, default=0, help="of the irregular durations")
     recorder.set_defaults(run=_record)
     fitter = commands.add_parser("fit", help="estimate the constants of the recorded table")

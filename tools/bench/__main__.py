@@ -24,7 +24,7 @@ def _run(options: argparse.Namespace) -> int:
     for subject in options.subject:
         bench = import_module(f"tools.bench.{subject}").bench  # each needs libraries that the others do not
         if subject == "identify":
-            bench(sys.stdout, options.plants, options.seed, options.jobs, options.pty)
+            bench(sys.stdout, options.plants, options.seed, options.jobs, options.pty, options.wide)
         else:
             bench(sys.stdout)
     return 0
@@ -40,7 +40,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("subject", choices=SUBJECTS, nargs="+")
     identify = parser.add_argument_group("for identify")
     identify.add_argument("--pty", action="store_true", help="in real time: takes minutes, on a quiet machine")
-    identify.add_argument("--plants", metavar="N", type=int, default=10, help="random tables (default 10)")
+    identify.add_argument(
+        "--wide", action="store_true", help="a wider family of tables, and the default table with seeds 0 to 19"
+    )
+    identify.add_argument(
+        "--plants", metavar="N", type=int, help="number of random tables (default: 10; with --wide 40)"
+    )
     identify.add_argument("--seed", metavar="N", type=int, default=1, help="of the first table (default 1)")
     identify.add_argument("--jobs", metavar="N", type=int, default=2, help="tables at once (default 2)")
     return parser

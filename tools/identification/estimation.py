@@ -25,26 +25,42 @@ Predict = Callable[[Array], Array]
 
 
 class Level(NamedTuple):
-    """A part of the search: at which scale, for how many rounds, and how many chains continue after it."""
+    """A part of the search."""
 
-    least_deg: float
-    rounds: int
-    members: int
-    survivors: int
+    least_deg: float  # the scale
+    rounds: int  # at most
+    members: int  # of an ensemble
+    survivors: int  # chains that continue afterwards
+    enough: float = -np.inf  # the level ends once the heights rise by less within some rounds
 
 
-FIRST_LEVEL = Level(2e-2, 5, 28, 1)
+COMMON_LEVEL = Level(2e-2, 5, 28, 1)
+"""All chains together, before they fork."""
+
 LEVELS = (
     Level(1e-2, 2, 28, 5),
-    Level(5e-3, 2, 28, 4),
-    Level(2.5e-3, 2, 28, 3),
-    Level(1.2e-3, 2, 32, 3),
-    Level(6e-4, 3, 32, 2),
-    Level(3e-4, 7, 36, 2),
+    Level(5e-3, 2, 28, 3),
+    Level(2.5e-3, 2, 28, 2),
+    Level(1.2e-3, 2, 32, 2),
 )
+
+FINE_LEVELS = (
+    Level(6e-4, 3, 32, 2),
+    Level(3e-4, 18, 36, 2, enough=3.0),
+)
+"""After the best chain has forked once more."""
+
+_FORK = (-0.13, 0.13)
+"""By how much the forked constant differs then, in standard units."""
 
 _FIRST_SPREAD = 0.25
 """Standard deviation of the first ensemble, as a share of the prior's."""
+
+_PATIENCE = 4
+"""For how many rounds a rise is counted."""
+
+_SAME_SHARE, _LEAST_CHAINS = 0.2, 2
+"""Chains whose predictions differ by less than this share of the scale are on the same peak."""
 
 _REACH = (0.25, 4.0)
 """Least and greatest covariance of an ensemble, as a share of the posterior's."""
@@ -124,21 +140,43 @@ def estimate(
         progress: Called with the share that is done.
     """
     chance = np.random.default_rng(0)
+    levels = (COMMON_LEVEL, *LEVELS, *FINE_LEVELS)
     first = _FIRST_SPREAD**2 * np.eye(posterior.size)
     chains = [_Chain(np.zeros(posterior.size + posterior.drift.shape[1]), np.empty(0), first, _REACH[1], -np.inf)]
-    counts = [1, len(values), *(level.survivors for level in LEVELS[:-1])]
-    work = sum(level.rounds * count for level, count in zip((FIRST_LEVEL, *LEVELS), counts, strict=True))
-    done = 0
-    for level in (FIRST_LEVEL, *LEVELS):
-        for _ in range(level.rounds):
-            chains = [_advanced(posterior, chain, level, chance) for chain in chains]
-            done += len(chains)
-            progress(done / work)
-        if DEBUG: print("    ", level.least_deg, [(round(c.height,1), round(float(np.exp(np.log(10)+1.5*c.vector[3])),2)) for c in chains],flush=True)
-        chains = sorted(chains, key=lambda chain: -chain.height)[: level.survivors]
-        if level is FIRST_LEVEL:
+    for done, level in enumerate(levels):
+        if level is LEVELS[0]:
             chains = [_forked(chains[0], first, forked, value) for value in values]
+        if level is FINE_LEVELS[0]:
+            best = chains[0]
+            chains += [_forked(best, best.covariance, forked, best.vector[forked] + shift) for shift in _FORK]
+        heights = [-np.inf] * _PATIENCE
+        for turn in range(level.rounds):
+            chains = [_advanced(posterior, chain, level, chance) for chain in chains]
+            progress((done + (turn + 1) / level.rounds) / len(levels))
+            heights.append(max(chain.height for chain in chains))
+            if heights[-1] - heights[-1 - _PATIENCE] < level.enough:
+                break
+        if DEBUG:
+            print(
+                "    ",
+                level.least_deg,
+                turn + 1,
+                [(round(c.height, 1), round(float(np.exp(np.log(10) + 1.5 * c.vector[3])), 2)) for c in chains],
+                flush=True,
+            )
+        chains = _survivors(chains, level)
     return _with_covariance(posterior, chains, chance)
+
+
+def _survivors(chains: list[_Chain], level: Level) -> list[_Chain]:
+    """Return the highest chains; of those that predict the same only one, but two chains at least."""
+    first, *others = sorted(chains, key=lambda chain: -chain.height)
+    kept, copies = [first], []
+    for chain in others:
+        apart_deg = min(float(np.std(chain.predicted_deg - other.predicted_deg)) for other in kept)
+        (kept if apart_deg > _SAME_SHARE * level.least_deg else copies).append(chain)
+    kept += copies[: max(0, _LEAST_CHAINS - len(kept))]
+    return kept[: level.survivors]
 
 
 def _forked(chain: _Chain, first: Array, index: int, value: float) -> _Chain:
@@ -256,9 +294,11 @@ class _LinearPosterior(NamedTuple):
         information = self.information(np.zeros(self.basis.shape[1]), scale_deg)
         variance = np.sum(self.residual**2, axis=0) / max(members - size - 1, 1)
         noise = float(np.sum(weight * variance)) / members
-        values, axes = np.linalg.eigh(information[:size, :size])
-        lost = np.minimum(noise, (1.0 - _LEAST_INFORMATION) * np.maximum(values, 0.0))
-        information[:size, :size] -= (axes * lost) @ axes.T
+        noisy = np.zeros_like(information)
+        noisy[:size, :size] = noise * np.eye(size)
+        values, axes = np.linalg.eigh(information - noisy)
+        former = np.einsum("ij,ik,kj->j", axes, information, axes)
+        information = (axes * np.maximum(values, _LEAST_INFORMATION * former)) @ axes.T
         slopes = (self.residual * weight) @ self.slopes
         spurious: Array = slopes.T @ slopes / max(members - size - 1, 1)
         return information, spurious

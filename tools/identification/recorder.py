@@ -19,6 +19,7 @@ def record(
     speed_deg_s: float,
     baud: int,
     progress: Callable[[float], None] = lambda _: None,
+    check: Callable[[WireRecording], None] = lambda _: None,
 ) -> WireRecording:
     """Return what the table answers while it makes the bursts; it ends where it began.
 
@@ -28,6 +29,7 @@ def record(
         speed_deg_s: The top speed, which no swing reaches.
         baud: Of the line: a command counts from when it is complete at the table.
         progress: Called with the share that is done.
+        check: Called after each burst with the recording so far; it may raise to end a recording that is of no use.
 
     Raises:
         TableError: The table refused a command, or went silent; it was stopped, and a note says how that went.
@@ -43,6 +45,7 @@ def record(
         recorder.read()
         for burst in bursts:
             recorder.run(burst)
+            check(recorder.recording())
             progress(min(recorder.now_s() / length_s, 1.0))
         client.wait_until_at(home_deg)
     except BaseException as error:

@@ -5,7 +5,7 @@ Over the wire (`WireRecording`), a CSV file with the columns
     time_s        when the line was complete at the table, on the recorder's clock
     command       `P 30.0`, `R`, `S` and `A` likewise; `H` in the row of a reading
     position_deg  the answer to `H`, empty in the rows of the other commands
-    reply_s       when the reply was complete, on the same clock; may be missing
+    reply_s       when the reply was complete, on the same clock; the column may be missing or empty
 
 From a drive (`DriveRecording`), or from the emulator's own trace, a CSV file that has among its columns `time_s`,
 `duty` (-1..1) and `position_deg` or `encoder_deg`.
@@ -15,7 +15,7 @@ The names of the columns and commands may be in upper or lower case, the separat
 
 import csv
 from itertools import pairwise
-from math import nan
+from math import isnan, nan
 from pathlib import Path
 from typing import NamedTuple
 
@@ -77,7 +77,7 @@ def write_recording(path: Path, recording: WireRecording) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow((*COLUMNS, _REPLY))
         writer.writerows(
-            (f"{time_s:.6f}", command, angle, f"{reply_s:.6f}")
+            (f"{time_s:.6f}", command, angle, "" if isnan(reply_s) else f"{reply_s:.6f}")
             for time_s, command, angle, reply_s in sorted(rows, key=lambda row: row[0])
         )
 
@@ -132,7 +132,7 @@ def _wire(table: Table) -> WireRecording:
         if verb not in set("HPRSA") or (verb == "H" and value):
             raise table.error(row, f"the command is {command!r}; it must be H, P, R, S or A")
         time_s = table.number(row, "time_s", row.cells["time_s"])
-        reply_s = table.number(row, _REPLY, row.cells[_REPLY]) if _REPLY in row.cells else nan
+        reply_s = table.number(row, _REPLY, row.cells[_REPLY]) if row.cells.get(_REPLY) else nan
         if verb == "H":
             times.append(time_s)
             replies.append(reply_s)

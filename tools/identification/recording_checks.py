@@ -14,9 +14,11 @@ LEAST_READINGS = 300
 LONGEST_GAP_S = 0.5
 _LEAST_TRAVEL_DEG = 5.0
 _STALL_S = 1.0
+_OBEYED_DEG = 0.3
 _STRAY_DEG = 3.0
 _UNSENT_S, _AT_REST_DEG = 0.3, 0.2
 """For how long, and within which range, the prediction rests when the table moves without a command."""
+_MOST_LATE = 0.3
 _SHORTEST_REPLY = len("OK\r")
 _OVERLAP_S = 1e-3
 
@@ -33,6 +35,23 @@ def check_recording(config: TableConfig, recording: WireRecording | DriveRecordi
         _check_against_commands(config, recording)
     else:
         _check_duty(config, recording)
+
+
+def check_line(config: TableConfig, recording: WireRecording) -> None:
+    """Refuse a recording in progress if the line or the recording computer delays too much.
+
+    Raises:
+        RecordingError: The replies do not determine the table's ticks, or too many are late.
+    """
+    at = timing(config, recording)
+    if at.fault:
+        raise RecordingError(at.fault)
+    late = float(np.mean(at.doubtful_readings))
+    if late > _MOST_LATE:
+        raise RecordingError(
+            f"{100.0 * late:.0f} % of the replies come late (allowed {100.0 * _MOST_LATE:.0f} %): the computer is "
+            "busy, or the line delays replies"
+        )
 
 
 def _check_times(time_s: Array) -> None:
@@ -127,9 +146,11 @@ _Fault = tuple[float, str]
 
 def _stall(time_s: Array, seen_deg: Array, predicted_deg: Array) -> _Fault | None:
     before = np.searchsorted(time_s, time_s - _STALL_S)
-    stands = np.abs(seen_deg - seen_deg[before]) < 1e-9
+    changes = np.cumsum(np.abs(np.diff(seen_deg, prepend=seen_deg[0])) > 1e-9)
+    stands = changes == changes[before]
     should_move = np.abs(predicted_deg - predicted_deg[before]) > 1.0
-    stalled = stands & should_move & (time_s - time_s[0] > _STALL_S)
+    obeyed = np.abs(seen_deg - predicted_deg)[before] < _OBEYED_DEG
+    stalled = stands & should_move & obeyed & (time_s - time_s[0] > _STALL_S)
     if not stalled.any():
         return None
     at = float(time_s[np.argmax(stalled)])

@@ -16,12 +16,14 @@ _COMMON = 0.5
 _LOCALLY_COMMON = 0.3
 """The same within a window; a window with less (late replies, or few) takes its phase from its neighbors."""
 
-_BIN_PERIODS, _WINDOW_TICKS = 100.0, 2000.0
+_BIN_PERIODS, _WINDOW_TICKS = 100.0, 1000.0
 _LEAST_IN_WINDOW = 20
 _MOST_RATE = 2.5e-3
 """The greatest difference between the rates of the clocks."""
-_MOST_STEP = 0.2
-"""The greatest change of the phase from one window to the next, in ticks."""
+_MOST_STEP, _APART = 0.25, 2
+"""The greatest change of the phase between so many windows, in ticks: one window may see both sides of a jump."""
+_STEADY = 0.8
+"""Least share of the windows in which the phase is common."""
 _COARSER = range(2, 65)
 
 
@@ -86,16 +88,16 @@ def _tracked(sent: Array, rate: float) -> Grid:
         if np.count_nonzero(of_window) >= _LEAST_IN_WINDOW
     ]
     strong = [(center, phasor) for center, phasor in common if abs(phasor) > _LOCALLY_COMMON]
-    if len(strong) < max(1.0, _COMMON * len(common)):
+    if len(strong) < max(1.0, _STEADY * len(common)):
         return Grid(fault="the recorder's clock runs unevenly: the replies keep no phase with the table's ticks")
     centers = np.array([center for center, _ in strong])
     phases = np.unwrap(np.angle([phasor for _, phasor in strong])) / (2.0 * np.pi)
-    steps = np.abs(np.diff(phases))
+    steps = np.abs(phases[_APART:] - phases[:-_APART])
     fault = ""
     if len(steps) and steps.max() > _MOST_STEP:
         at = int(np.argmax(steps))
         fault = (
-            f"the recorder's clock jumps, or runs unevenly, between tick {centers[at]:.0f} and {centers[at + 1]:.0f}: "
+            f"the recorder's clock jumps, or runs unevenly, between tick {centers[at]:.0f} and {centers[at + _APART]:.0f}: "
             f"the phase of the replies changes by {steps[at]:.2f} ticks"
         )
     return Grid(rate, centers, phases, fault)

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from emulator.config import load_config
-from tools.bench.identify import BACKLASH_ARCMIN, SPREAD, random_plant, write_plant
+from tools.bench.identify_tables import BACKLASH_ARCMIN, SPREAD, random_plant, write_plant
 
 
 @pytest.mark.parametrize("seed", range(5))

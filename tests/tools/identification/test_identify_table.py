@@ -5,7 +5,7 @@ import pytest
 import emulator  # noqa: F401  # teaches pyserial the port emulator://
 from emulator.config import TableConfig, load_config
 from protocol.client import TableClient
-from tools.bench.identify import write_plant
+from tools.bench.identify_tables import write_plant
 from tools.emulated import Motion, emulate
 from tools.identification.constants import Constant, coulomb_Nm
 from tools.identification.excitation import excitation
