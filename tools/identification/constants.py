@@ -14,10 +14,9 @@ from tools.tuning.linear_model import Teeth, load_ratio, speed_gain_deg_s, time_
 
 _SURE_95 = 1.96
 
-_DOUBTED_PRIOR = 3.0
 _IDENTIFIABLE_DEVIATION = 0.25
-"""A constant is identifiable if its logarithm is known to this standard deviation even with a prior three times as
-wide: then the recording determines it, and not the prior."""
+"""A constant is identifiable if the readings alone, without what was assumed of it, give its logarithm with at most
+this standard deviation."""
 
 
 class Constant(NamedTuple):
@@ -67,19 +66,20 @@ def constants_of(config: TableConfig, found: Estimate, deviation: Array, from_dr
         from_drive: Whether the delay is one of a drive.
     """
     size = len(PARAMETERS)
-    doubting = deviation.copy()
-    doubting[:size] *= _DOUBTED_PRIOR
-    doubted = np.linalg.inv(found.likelihood_information + np.diag(doubting**-2.0))
     result = []
     for name, unit, function in DERIVED:
         slope = np.zeros(len(found.vector))
         slope[:size] = _log_slope(config, found.vector[:size], function)
-        after, alone = (float(np.sqrt(slope @ spread @ slope)) for spread in (found.covariance, doubted))
+        before, after = (float(np.sqrt(slope @ spread @ slope)) for spread in (np.diag(deviation**2), found.covariance))
         value = function(with_logarithms(config, found.vector[:size]))
         factor = exp(min(_SURE_95 * after, 50.0))
-        identifiable = max(after, alone) < _IDENTIFIABLE_DEVIATION
-        result.append(Constant(name, unit, value, value / factor, value * factor, identifiable))
+        result.append(Constant(name, unit, value, value / factor, value * factor, _identifiable(before, after)))
     return (*result, _delay(found, float(deviation[size]), from_drive))
+
+
+def _identifiable(before: float, after: float) -> bool:
+    """Return whether the readings alone determine a quantity, from its standard deviations before and after them."""
+    return bool(after**-2.0 - before**-2.0 > _IDENTIFIABLE_DEVIATION**-2.0)
 
 
 def _delay(found: Estimate, prior: float, from_drive: bool) -> Constant:

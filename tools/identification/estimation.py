@@ -13,15 +13,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from tools.emulated import Array
-from tools.identification.ensemble import Ensemble, drawn, regressed
-from tools.identification.likelihood import Intervals
-
-DEBUG = False
-Predict = Callable[[Array], Array]
-"""Returns the angles (deg) that the readings should show, for a vector of constants, without the drift."""
+from tools.identification.ensemble import drawn
+from tools.identification.posterior import LinearPosterior, Posterior
 
 
 class Level(NamedTuple):
@@ -70,15 +65,16 @@ _TRUST = 2.0
 _STEPS = (1.0, 0.5, 0.25)
 
 _NEWTON_ROUNDS, _NEWTON_GAIN = 12, 0.05
-_DRIFT_ROUNDS, _DRIFT_GAIN = 6, 0.01
+
+_EQUAL_HEIGHT = 8.0
+"""A peak that is lower by this is less likely by a factor e: the height of a narrow peak is partly chance."""
 
 _CONFIDENCE_SCALE_DEG = 1.5e-3
 """The covariance counts no reading as more accurate than this: finer detail belongs to one of many narrow peaks."""
+_CONFIDENCE_SHARE = 5.0
+"""Nor as more accurate than so many times the scale at which the best peak explains the readings."""
+_NEGLIGIBLE = 1e-9
 _CONFIDENCE_MEMBERS = (60, 60, 120)
-_LEAST_INFORMATION = 0.05
-"""The share of an information that is left at least after noise is subtracted from it."""
-_EQUAL_HEIGHT = 8.0
-"""A peak that is lower by this is less likely by a factor e: the height of a narrow peak is partly chance."""
 
 
 class Estimate(NamedTuple):
@@ -86,36 +82,9 @@ class Estimate(NamedTuple):
 
     vector: Array
     covariance: Array
-    likelihood_information: Array  # about the constants and the drift, without the prior
     log_posterior: float
     scale_deg: float  # of the prediction error
     predicted_deg: Array
-
-
-class Posterior(NamedTuple):
-    """The problem: readings and model.
-
-    A vector holds the constants, then the coefficients of the drift, both in standard units: beforehand each component
-    is normally distributed with mean 0 and standard deviation 1.
-    """
-
-    readings: Intervals
-    predict: Predict
-    drift: Array  # (readings, coefficients)
-    size: int  # how many constants
-
-    def height(self, vector: Array, predicted_deg: Array, scale_deg: float) -> float:
-        """Return the logarithm of the posterior."""
-        return self.readings.log_likelihood(predicted_deg, scale_deg) - 0.5 * float(vector @ vector)
-
-    def with_drift(self, constants: Array, drift: Array, scale_deg: float) -> tuple[Array, Array]:
-        """Return the vector with the likeliest drift, by Newton's method from a drift near it, and its angles."""
-        basis = np.vstack([np.zeros((self.size, len(drift))), np.eye(len(drift))])
-        model = _LinearPosterior(
-            self, np.concatenate([constants, drift]), basis, self.predict(constants) + self.drift @ drift, self.drift
-        )
-        move = model.maximum(scale_deg, np.full(len(drift), np.inf), _DRIFT_ROUNDS, _DRIFT_GAIN)
-        return model.origin + basis @ move, model.still_deg + self.drift @ move
 
 
 class _Chain(NamedTuple):
@@ -141,8 +110,8 @@ def estimate(
     """
     chance = np.random.default_rng(0)
     levels = (COMMON_LEVEL, *LEVELS, *FINE_LEVELS)
-    first = _FIRST_SPREAD**2 * np.eye(posterior.size)
-    chains = [_Chain(np.zeros(posterior.size + posterior.drift.shape[1]), np.empty(0), first, _REACH[1], -np.inf)]
+    origin, first = np.zeros(posterior.size + posterior.drift.shape[1]), _FIRST_SPREAD**2 * np.eye(posterior.size)
+    chains = [_Chain(origin, np.empty(0), first, _REACH[1], -np.inf)]
     for done, level in enumerate(levels):
         if level is LEVELS[0]:
             chains = [_forked(chains[0], first, forked, value) for value in values]
@@ -156,14 +125,6 @@ def estimate(
             heights.append(max(chain.height for chain in chains))
             if heights[-1] - heights[-1 - _PATIENCE] < level.enough:
                 break
-        if DEBUG:
-            print(
-                "    ",
-                level.least_deg,
-                turn + 1,
-                [(round(c.height, 1), round(float(np.exp(np.log(10) + 1.5 * c.vector[3])), 2)) for c in chains],
-                flush=True,
-            )
         chains = _survivors(chains, level)
     return _with_covariance(posterior, chains, chance)
 
@@ -171,7 +132,8 @@ def estimate(
 def _survivors(chains: list[_Chain], level: Level) -> list[_Chain]:
     """Return the highest chains; of those that predict the same only one, but two chains at least."""
     first, *others = sorted(chains, key=lambda chain: -chain.height)
-    kept, copies = [first], []
+    kept: list[_Chain] = [first]
+    copies: list[_Chain] = []
     for chain in others:
         apart_deg = min(float(np.std(chain.predicted_deg - other.predicted_deg)) for other in kept)
         (kept if apart_deg > _SAME_SHARE * level.least_deg else copies).append(chain)
@@ -189,7 +151,7 @@ def _advanced(posterior: Posterior, chain: _Chain, level: Level, chance: np.rand
     """Return a chain after one round: ensemble, linear model, step, and the spread of the next ensemble."""
     size, drift = posterior.size, chain.vector[posterior.size :]
     ensemble = drawn(posterior.predict, chain.vector[:size], chain.covariance, level.members, chance)
-    model = _LinearPosterior.of(posterior, ensemble, drift)
+    model = LinearPosterior.of(posterior, ensemble, drift)
     scale_deg = posterior.readings.best_scale_deg(model.still_deg, level.least_deg)
     reachable = np.array([_TRUST] * size + [np.inf] * len(drift))
     move = model.maximum(scale_deg, reachable, _NEWTON_ROUNDS, _NEWTON_GAIN)
@@ -223,108 +185,34 @@ def _advanced(posterior: Posterior, chain: _Chain, level: Level, chance: np.rand
 
 
 def _with_covariance(posterior: Posterior, chains: list[_Chain], chance: np.random.Generator) -> Estimate:
-    """Return the end of the highest chain with the covariance about it; other chains count by their heights."""
+    """Return the end of the highest chain with the covariance about it; other chains count by their heights.
+
+    What the linear model leaves out is a model error. It adds to the variance of the likelihood's slope, so its
+    information is Godambe's, H (H + S)^-1 H, with H the negative Hessian and S that variance.
+    """
     best, *others = chains
     size, drift = posterior.size, best.vector[posterior.size :]
-    scale_deg = posterior.readings.best_scale_deg(best.predicted_deg, LEVELS[-1].least_deg)
-    coarse_deg = max(scale_deg, _CONFIDENCE_SCALE_DEG)
+    scale_deg = posterior.readings.best_scale_deg(best.predicted_deg, FINE_LEVELS[-1].least_deg)
+    coarse_deg = max(_CONFIDENCE_SHARE * scale_deg, _CONFIDENCE_SCALE_DEG)
     covariance = best.covariance
     for members in _CONFIDENCE_MEMBERS:
         ensemble = drawn(posterior.predict, best.vector[:size], covariance, members, chance)
-        model = _LinearPosterior.of(posterior, ensemble, drift)
+        model = LinearPosterior.of(posterior, ensemble, drift)
         information, spurious = model.measured_information(coarse_deg)
         unrooted = np.linalg.inv(model.basis)
         information, spurious = (unrooted.T @ matrix @ unrooted for matrix in (information, spurious))
-        whole: Array = np.linalg.inv(information + np.eye(len(best.vector))).astype(np.float64)
-        whole = whole + whole @ spurious @ whole
-        covariance = _limited(whole[:size, :size])
+        prior = np.eye(len(best.vector))
+        covariance = _limited(np.linalg.inv(information + prior)[:size, :size].astype(np.float64))
+        robust = information @ np.linalg.solve(information + spurious + _NEGLIGIBLE * prior, information)
+        whole: Array = np.linalg.inv((robust + robust.T) / 2.0 + prior).astype(np.float64)
     for other in others:
         odds = np.exp(min(0.0, other.height - best.height) / _EQUAL_HEIGHT)
         apart = other.vector - best.vector
         whole = whole + odds / (1.0 + odds) * np.outer(apart, apart)
-    return Estimate(best.vector, whole, information, best.height, scale_deg, best.predicted_deg)
+    return Estimate(best.vector, whole, best.height, scale_deg, best.predicted_deg)
 
 
 def _limited(covariance: Array) -> Array:
     """Return a covariance that is nowhere wider than the first ensemble's."""
     information = np.linalg.inv(covariance) + _FIRST_SPREAD**-2.0 * np.eye(len(covariance))
-    result: Array = np.linalg.inv((information + information.T) / 2.0)
-    return result
-
-
-class _LinearPosterior(NamedTuple):
-    """The posterior with a linear model of the angles. A move shifts the constants by units, and the drift."""
-
-    posterior: Posterior
-    origin: Array
-    basis: Array  # vector = origin + basis @ move
-    still_deg: Array
-    slopes: Array  # angles = still + slopes @ move
-    residual: Array = np.empty((0, 0))  # (members, readings), what the linear model leaves out
-
-    @classmethod
-    def of(cls, posterior: Posterior, ensemble: Ensemble, drift: Array) -> "_LinearPosterior":
-        linear = regressed(ensemble)
-        return cls(
-            posterior,
-            np.concatenate([ensemble.center, drift]),
-            block_diag(ensemble.root, np.eye(len(drift))),
-            linear.mean + posterior.drift @ drift,
-            np.hstack([linear.slopes, posterior.drift]),
-            linear.residual,
-        )
-
-    def height(self, move: Array, scale_deg: float) -> float:
-        return self.posterior.height(self.origin + self.basis @ move, self.still_deg + self.slopes @ move, scale_deg)
-
-    def information(self, move: Array, scale_deg: float) -> Array:
-        """Return the likelihood's negative Hessian."""
-        _, weight = self.posterior.readings.derivatives(self.still_deg + self.slopes @ move, scale_deg)
-        result: Array = self.slopes.T @ (self.slopes * weight[:, None])
-        return result
-
-    def measured_information(self, scale_deg: float) -> tuple[Array, Array]:
-        """Return the likelihood's negative Hessian, and the variance of its slope by what the linear model leaves out.
-
-        The residual also adds noise to the slopes of the linear model. The information that this noise seems to give
-        is subtracted.
-        """
-        _, weight = self.posterior.readings.derivatives(self.still_deg, scale_deg)
-        members, size = len(self.residual), self.posterior.size
-        information = self.information(np.zeros(self.basis.shape[1]), scale_deg)
-        variance = np.sum(self.residual**2, axis=0) / max(members - size - 1, 1)
-        noise = float(np.sum(weight * variance)) / members
-        noisy = np.zeros_like(information)
-        noisy[:size, :size] = noise * np.eye(size)
-        values, axes = np.linalg.eigh(information - noisy)
-        former = np.einsum("ij,ik,kj->j", axes, information, axes)
-        information = (axes * np.maximum(values, _LEAST_INFORMATION * former)) @ axes.T
-        slopes = (self.residual * weight) @ self.slopes
-        spurious: Array = slopes.T @ slopes / max(members - size - 1, 1)
-        return information, spurious
-
-    def prior_information(self) -> Array:
-        result: Array = self.basis.T @ self.basis
-        return result
-
-    def maximum(self, scale_deg: float, reachable: Array, rounds: int, enough: float) -> Array:
-        """Return the best move within bounds, by Newton's method with Levenberg's damping."""
-        move, damping = np.zeros(self.basis.shape[1]), 1e-4
-        height = self.height(move, scale_deg)
-        for _ in range(rounds):
-            slope, _ = self.posterior.readings.derivatives(self.still_deg + self.slopes @ move, scale_deg)
-            rise = self.slopes.T @ slope - self.basis.T @ (self.origin + self.basis @ move)
-            information = self.information(move, scale_deg) + self.prior_information()
-            while damping < 1e5:
-                damped = information + damping * np.diag(np.diag(information))
-                candidate = np.clip(move + np.linalg.solve(damped, rise), -reachable, reachable)
-                gain = self.height(candidate, scale_deg) - height
-                if gain > 0.0:
-                    break
-                damping *= 6.0
-            else:
-                return move
-            move, height, damping = candidate, height + gain, max(damping / 6.0, 1e-6)
-            if gain < enough:
-                return move
-        return move
+    return np.linalg.inv((information + information.T) / 2.0).astype(np.float64)

@@ -8,7 +8,7 @@ from emulator.config import TableConfig
 from tools.identification.errors import RecordingError
 from tools.identification.identify_table import Identified
 
-MOST_UNEXPLAINED_DEG = 1e-3
+MOST_UNEXPLAINED_DEG = 2e-3
 """The root mean square beyond rounding that a good recording stays below."""
 
 _STRIPES = 30

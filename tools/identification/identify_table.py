@@ -62,5 +62,4 @@ def _in_units(prior: Prior, found: Estimate) -> Estimate:
     return found._replace(
         vector=prior.mean + prior.deviation * found.vector,
         covariance=found.covariance * squares,
-        likelihood_information=found.likelihood_information / squares,
     )

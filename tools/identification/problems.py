@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from emulator.config import TableConfig
 from tools.emulated import Array
-from tools.identification.estimation import Posterior
 from tools.identification.likelihood import Intervals
 from tools.identification.parameters import PARAMETERS, with_logarithms
+from tools.identification.posterior import Posterior
 from tools.identification.recording import DriveRecording, WireRecording
 from tools.identification.simulation import (
     Standstill,

@@ -97,7 +97,7 @@ def _tracked(sent: Array, rate: float) -> Grid:
     if len(steps) and steps.max() > _MOST_STEP:
         at = int(np.argmax(steps))
         fault = (
-            f"the recorder's clock jumps, or runs unevenly, between tick {centers[at]:.0f} and {centers[at + _APART]:.0f}: "
+            f"the recorder's clock jumps or runs unevenly (ticks {centers[at]:.0f} to {centers[at + _APART]:.0f}): "
             f"the phase of the replies changes by {steps[at]:.2f} ticks"
         )
     return Grid(rate, centers, phases, fault)
