@@ -85,8 +85,8 @@ def _fit(options: argparse.Namespace) -> int:
     odds = motor_at_odds(found, config)
     if odds:
         print(f"identify: warning: {odds}", file=sys.stderr)
-    page = fit_report(found, config, str(options.recording))
-    write_whole(options.out, table_toml(found))
+    page = fit_report(found, config, str(options.recording), odds)
+    write_whole(options.out, table_toml(found, odds))
     write_whole(report, page)
     print(f"wrote {options.out} and {report}", file=sys.stderr)
     return 0

@@ -63,6 +63,8 @@ _SHORTER, _LONGER = 0.3, 1.5
 _TRUST = 2.0
 """How far a step leads at most, in standard deviations of the ensemble."""
 _STEPS = (1.0, 0.5, 0.25)
+_HALF_TRUST = 6.0
+"""The same for one half of the readings."""
 
 _NEWTON_ROUNDS, _NEWTON_GAIN = 12, 0.05
 
@@ -77,11 +79,19 @@ _NEGLIGIBLE = 1e-9
 _CONFIDENCE_MEMBERS = (60, 60, 120)
 
 
+class Half(NamedTuple):
+    """What one half of the readings gives, near the peak of all, with the covariance of the likelihood and prior."""
+
+    vector: Array
+    covariance: Array
+
+
 class Estimate(NamedTuple):
     """A peak of the posterior, in standard units."""
 
     vector: Array
     covariance: Array
+    halves: tuple[Half, Half]
     log_posterior: float
     scale_deg: float  # of the prediction error
     predicted_deg: Array
@@ -205,11 +215,25 @@ def _with_covariance(posterior: Posterior, chains: list[_Chain], chance: np.rand
         covariance = _limited(np.linalg.inv(information + prior)[:size, :size].astype(np.float64))
         robust = information @ np.linalg.solve(information + spurious + _NEGLIGIBLE * prior, information)
         whole: Array = np.linalg.inv((robust + robust.T) / 2.0 + prior).astype(np.float64)
+    middle = len(best.predicted_deg) // 2
+    halves = (
+        _half(model.part(slice(None, middle)), scale_deg),
+        _half(model.part(slice(middle, None)), scale_deg),
+    )
     for other in others:
         odds = np.exp(min(0.0, other.height - best.height) / _EQUAL_HEIGHT)
         apart = other.vector - best.vector
         whole = whole + odds / (1.0 + odds) * np.outer(apart, apart)
-    return Estimate(best.vector, whole, best.height, scale_deg, best.predicted_deg)
+    return Estimate(best.vector, whole, halves, best.height, scale_deg, best.predicted_deg)
+
+
+def _half(model: LinearPosterior, scale_deg: float) -> Half:
+    size = model.posterior.size
+    reachable = np.array([_HALF_TRUST] * size + [np.inf] * (model.basis.shape[1] - size))
+    move = model.maximum(scale_deg, reachable, _NEWTON_ROUNDS, _NEWTON_GAIN)
+    information, _ = model.measured_information(scale_deg)
+    covariance = np.linalg.inv(information + model.prior_information())
+    return Half(model.origin + model.basis @ move, model.basis @ covariance @ model.basis.T)
 
 
 def _limited(covariance: Array) -> Array:

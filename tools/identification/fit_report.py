@@ -17,39 +17,41 @@ _GAP_S = 0.5
 def verdict(constant: Constant) -> str:
     """Return a constant with its interval in one line."""
     line = f"{constant.name}: {constant.value:.4g} ({constant.low:.4g} .. {constant.high:.4g}) {constant.unit}"
-    return line if constant.identifiable else f"{line}  [not told by this recording: mostly what was assumed]"
+    return line if constant.identifiable else f"{line}  [not identifiable from this recording: mostly what was assumed]"
 
 
-def table_toml(found: Identified) -> str:
+def table_toml(found: Identified, warning: str = "") -> str:
     """Return the identified table, with what was known of it beforehand, as a file for `--config`."""
-    lines = ["Identified from a recording. Torques and inertias hold for the motor resistance that was assumed."]
+    lines = [f"Warning: {warning}"] if warning else []
+    lines += ["Identified from a recording. Torques and inertias hold for the motor resistance that was assumed."]
     lines += [verdict(constant) for constant in found.constants]
     estimated = frozenset(f"{parameter.section}.{parameter.key}" for parameter in PARAMETERS)
     return config_toml(found.config, "\n".join(lines), always=estimated)
 
 
-def fit_report(found: Identified, assumed: TableConfig, source: str) -> str:
+def fit_report(found: Identified, assumed: TableConfig, source: str, warning: str = "") -> str:
     """Return the report as HTML."""
     rows = [
         (
             f"{constant.name}, {constant.unit}",
             f"{constant.value:.4g}",
             f"{constant.low:.4g} .. {constant.high:.4g}",
-            "+told" if constant.identifiable else "not told",
+            "+identifiable" if constant.identifiable else "not identifiable",
         )
         for constant in found.constants
     ]
-    untold = [constant.name for constant in found.constants if not constant.identifiable]
+    missing = [constant.name for constant in found.constants if not constant.identifiable]
     return page(
         "Identified table",
         [
             paragraph(f"From {source}: {len(found.time_s)} readings used, over {found.time_s[-1]:.1f} s.", "lead"),
             paragraph(
-                f"The recording does not tell: {', '.join(untold)}. Their values are mostly what was assumed."
-                if untold
-                else "The recording tells every constant.",
-                "" if untold else "good",
+                f"Not identifiable from this recording: {', '.join(missing)}. Their values are mostly what was assumed."
+                if missing
+                else "Every constant is identifiable.",
+                "" if missing else "good",
             ),
+            *([paragraph(f"Warning: {warning}.")] if warning else []),
             heading("Constants, with 95 % confidence intervals"),
             table_block(("constant", "estimate", "interval", ""), rows),
             paragraph(
@@ -61,7 +63,7 @@ def fit_report(found: Identified, assumed: TableConfig, source: str) -> str:
             heading("The fit"),
             figure_block(
                 svg_of(_fit_figure(found)),
-                "Recorded and predicted, and how far the predicted angles are outside what the readings tell.",
+                "Recorded and predicted angles, and the distance of the predicted angles from the readings' intervals.",
             ),
         ],
     )
@@ -82,7 +84,7 @@ def _fit_figure(found: Identified) -> Figure:
     bottom.plot(time_s, left, ".", markersize=2.5, color=BLUE)
     rms_deg = float(np.sqrt(np.mean(left**2)))
     bottom.set_title(
-        f"What rounding does not explain: {np.count_nonzero(left)} of {len(left)} readings, rms {rms_deg:.2g} deg"
+        f"Not explained by rounding: {np.count_nonzero(left)} of {len(left)} readings, rms {rms_deg:.2g} deg"
     )
     bottom.set_ylabel("deg")
     bottom.set_xlabel("time, s")

@@ -9,7 +9,7 @@ import numpy as np
 from emulator.config import TableConfig
 from tools.emulated import Array
 from tools.identification.constants import Constant, constants_of
-from tools.identification.estimation import Estimate, estimate
+from tools.identification.estimation import Estimate, Half, estimate
 from tools.identification.parameters import BACKLASH, PARAMETERS, with_logarithms
 from tools.identification.problems import Prior, problem_of
 from tools.identification.recording import DriveRecording, WireRecording
@@ -62,4 +62,10 @@ def _in_units(prior: Prior, found: Estimate) -> Estimate:
     return found._replace(
         vector=prior.mean + prior.deviation * found.vector,
         covariance=found.covariance * squares,
+        halves=(_half_in_units(prior, found.halves[0]), _half_in_units(prior, found.halves[1])),
     )
+
+
+def _half_in_units(prior: Prior, half: Half) -> Half:
+    squares = np.outer(prior.deviation, prior.deviation)
+    return Half(prior.mean + prior.deviation * half.vector, half.covariance * squares)

@@ -20,6 +20,10 @@ class Intervals(NamedTuple):
     low_deg: Array
     high_deg: Array
 
+    def part(self, rows: slice) -> "Intervals":
+        """Return some of the readings."""
+        return Intervals(self.low_deg[rows], self.high_deg[rows])
+
     def log_likelihood(self, angle_deg: Array, scale_deg: float) -> float:
         """Return the logarithm of the probability of all readings, for predicted angles."""
         above, below = self._outside(angle_deg, scale_deg)

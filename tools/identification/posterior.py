@@ -72,6 +72,17 @@ class LinearPosterior(NamedTuple):
         """Return the logarithm of the posterior after a move."""
         return self.posterior.height(self.origin + self.basis @ move, self.still_deg + self.slopes @ move, scale_deg)
 
+    def part(self, rows: slice) -> "LinearPosterior":
+        """Return the same for some of the readings only."""
+        whole = self.posterior
+        part = whole._replace(readings=whole.readings.part(rows), drift=whole.drift[rows])
+        return self._replace(
+            posterior=part,
+            still_deg=self.still_deg[rows],
+            slopes=self.slopes[rows],
+            residual=self.residual[:, rows],
+        )
+
     def information(self, move: Array, scale_deg: float) -> Array:
         """Return the likelihood's negative Hessian."""
         _, weight = self.posterior.readings.derivatives(self.still_deg + self.slopes @ move, scale_deg)

@@ -40,7 +40,7 @@ def motor(constant_Nm_A: float) -> TableConfig:
     return replace(usual, motor=replace(usual.motor, torque_constant_Nm_A=constant_Nm_A))
 
 
-@pytest.mark.parametrize("factor", [0.5, 0.75, 1.4, 2.0])
+@pytest.mark.parametrize("factor", [0.5, 0.7, 1.4, 2.0])
 def test_a_motor_that_is_not_the_configured_one_is_named_with_its_no_load_speed(factor: float) -> None:
     odds = motor_at_odds(fit(motor(factor * 0.0234), np.zeros(len(_TIME_S))), load_config())
 
