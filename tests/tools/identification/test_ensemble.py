@@ -34,7 +34,8 @@ def test_a_linear_function_is_found_with_nothing_left() -> None:
 
 def test_ruggedness_is_averaged_out_of_the_slopes_and_stays_in_the_residual() -> None:
     def rugged(point: Array) -> Array:
-        return line(point) + 0.05 * np.sin(1e4 * point.sum())
+        result: Array = line(point) + 0.05 * np.sin(1e4 * point.sum())
+        return result
 
     ensemble = drawn(rugged, _CENTER, _COVARIANCE, 400, np.random.default_rng(1))
 

@@ -24,11 +24,13 @@ def swing(vector: Array) -> Array:
 def two_sided(vector: Array) -> Array:
     """The same width with either sign of the rate, but for a small term that only one of them has."""
     width, rate, offset = vector
-    return swing(np.array([width, abs(rate), offset])) + 0.004 * max(rate, 0.0) * np.cos(7.0 * _TIME)
+    result: Array = swing(np.array([width, abs(rate), offset])) + 0.004 * max(rate, 0.0) * np.cos(7.0 * _TIME)
+    return result
 
 
 def rugged(vector: Array) -> Array:
-    return swing(vector) + 0.002 * np.sin(3000.0 * vector.sum() + 50.0 * _TIME)
+    result: Array = swing(vector) + 0.002 * np.sin(3000.0 * vector.sum() + 50.0 * _TIME)
+    return result
 
 
 def read(angle_deg: Array) -> Intervals:

@@ -6,12 +6,13 @@ import pytest
 from emulator.config import TableConfig, load_config
 from tools.emulated import Array
 from tools.identification.errors import RecordingError
-from tools.identification.estimation import Estimate
+from tools.identification.estimation import Estimate, Half
 from tools.identification.fit_checks import check_fit, motor_at_odds
 from tools.identification.identify_table import Identified
 
 _TIME_S = np.linspace(0.0, 60.0, 4000)
-_NO_ESTIMATE = Estimate(np.empty(0), np.empty((0, 0)), 0.0, 0.0, np.empty(0))
+_NO_HALF = Half(np.empty(0), np.empty((0, 0)))
+_NO_ESTIMATE = Estimate(np.empty(0), np.empty((0, 0)), (_NO_HALF, _NO_HALF), 0.0, 0.0, np.empty(0))
 
 
 def fit(config: TableConfig, unexplained_deg: Array) -> Identified:
