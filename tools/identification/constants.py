@@ -30,7 +30,7 @@ class Constant(NamedTuple):
     identifiable: bool
 
 
-_Derived = Callable[[TableConfig], float]
+Derived = Callable[[TableConfig], float]
 
 
 def coulomb_Nm(config: TableConfig) -> float:
@@ -44,7 +44,7 @@ def coulomb_duty(config: TableConfig) -> float:
     return coulomb_Nm(config) * motor.resistance_ohm / motor.torque_constant_Nm_A / config.driver.supply_V
 
 
-DERIVED: tuple[tuple[str, str, _Derived], ...] = (
+DERIVED: tuple[tuple[str, str, Derived], ...] = (
     ("gain", "deg/s at full duty", speed_gain_deg_s),
     ("time constant", "ms, loaded", lambda config: 1e3 * time_constant_s(config, Teeth.DRIVING)),
     ("time constant, free", "ms, within the backlash", lambda config: 1e3 * time_constant_s(config, Teeth.FREE)),
@@ -69,7 +69,7 @@ def constants_of(config: TableConfig, found: Estimate, deviation: Array, from_dr
     result = []
     for name, unit, function in DERIVED:
         slope = np.zeros(len(found.vector))
-        slope[:size] = _log_slope(config, found.vector[:size], function)
+        slope[:size] = log_slope(config, found.vector[:size], function)
         before, after = (float(np.sqrt(slope @ spread @ slope)) for spread in (np.diag(deviation**2), found.covariance))
         value = function(with_logarithms(config, found.vector[:size]))
         factor = exp(min(_SURE_95 * after, 50.0))
@@ -92,7 +92,8 @@ def _delay(found: Estimate, prior: float, from_drive: bool) -> Constant:
     )
 
 
-def _log_slope(config: TableConfig, logarithms: Array, function: _Derived) -> Array:
+def log_slope(config: TableConfig, logarithms: Array, function: Derived) -> Array:
+    """Return the derivatives of a quantity's logarithm by the logarithms of the parameters."""
     step = 1e-4
     slopes = []
     for index in range(len(logarithms)):

@@ -1,12 +1,14 @@
 """Whether a fit is to be believed: the model must explain the readings, and the motor should be the configured one."""
 
-from math import log, pi
+from math import log, pi, sqrt
 
 import numpy as np
 
 from emulator.config import TableConfig
+from tools.identification.constants import DERIVED, Derived, log_slope
 from tools.identification.errors import RecordingError
 from tools.identification.identify_table import Identified
+from tools.identification.parameters import PARAMETERS, with_logarithms
 
 MOST_UNEXPLAINED_DEG = 2e-3
 """The root mean square beyond rounding that a good recording stays below."""
@@ -14,6 +16,11 @@ MOST_UNEXPLAINED_DEG = 2e-3
 _STRIPES = 30
 _WHOLE = 0.5
 """Errors in at least this share of the recording are said to be everywhere."""
+
+_COMPARED = ("gain", "time constant", "Coulomb friction as duty", "backlash")
+_MOST_APART = 2.5
+"""By how many standard deviations the halves may differ. Steady tables stay below 1, since the deviations include the
+model error."""
 
 _AT_ODDS = log(1.25)
 """A torque constant differs from its datasheet by a tenth; by a quarter it is another motor."""
@@ -23,8 +30,32 @@ def check_fit(found: Identified) -> None:
     """Refuse a fit that does not explain its recording.
 
     Raises:
-        RecordingError: What is left unexplained is more than rounding.
+        RecordingError: What is left unexplained is more than rounding, or the halves of the recording disagree.
     """
+    _check_residual(found)
+    for name, unit, function in DERIVED:
+        if name in _COMPARED:
+            _check_halves(found, name, unit, function)
+
+
+def _check_halves(found: Identified, name: str, unit: str, function: Derived) -> None:
+    values, variances = [], []
+    for half in found.estimate.halves:
+        logarithms = half.vector[: len(PARAMETERS)]
+        slope = np.zeros(len(half.vector))
+        slope[: len(PARAMETERS)] = log_slope(found.config, logarithms, function)
+        values.append(function(with_logarithms(found.config, logarithms)))
+        variances.append(float(slope @ half.covariance @ slope))
+    apart = abs(log(values[1] / values[0])) / sqrt(sum(variances))
+    if apart > _MOST_APART:
+        raise RecordingError(
+            f"the halves of the recording disagree: {name} {values[0]:.4g} in the first, {values[1]:.4g} {unit} in the "
+            f"second, {apart:.1f} standard deviations apart (allowed {_MOST_APART:g}): load, friction, table or clock "
+            "changed"
+        )
+
+
+def _check_residual(found: Identified) -> None:
     left = found.unexplained_deg
     rms_deg = float(np.sqrt(np.mean(left**2)))
     if rms_deg <= MOST_UNEXPLAINED_DEG:

@@ -9,15 +9,23 @@ from tools.identification.errors import RecordingError
 from tools.identification.estimation import Estimate, Half
 from tools.identification.fit_checks import check_fit, motor_at_odds
 from tools.identification.identify_table import Identified
+from tools.identification.parameters import PARAMETERS
 
 _TIME_S = np.linspace(0.0, 60.0, 4000)
-_NO_HALF = Half(np.empty(0), np.empty((0, 0)))
-_NO_ESTIMATE = Estimate(np.empty(0), np.empty((0, 0)), (_NO_HALF, _NO_HALF), 0.0, 0.0, np.empty(0))
 
 
-def fit(config: TableConfig, unexplained_deg: Array) -> Identified:
+def half(**factors: float) -> Half:
+    """What a half gives that sees some constants by a factor greater, each known to 2 %."""
+    vector = np.array([parameter.log_of(load_config()) for parameter in PARAMETERS])
+    for index, parameter in enumerate(PARAMETERS):
+        vector[index] += np.log(factors.get(parameter.key, 1.0))
+    return Half(vector, 0.02**2 * np.eye(len(vector)))
+
+
+def fit(config: TableConfig, unexplained_deg: Array, halves: tuple[Half, Half] | None = None) -> Identified:
     nothing = np.zeros(len(_TIME_S))
-    return Identified(config, (), _NO_ESTIMATE, _TIME_S, nothing, nothing, unexplained_deg)
+    estimate = Estimate(np.empty(0), np.empty((0, 0)), halves or (half(), half()), 0.0, 0.0, np.empty(0))
+    return Identified(config, (), estimate, _TIME_S, nothing, nothing, unexplained_deg)
 
 
 def test_a_fit_within_rounding_passes() -> None:
@@ -34,6 +42,24 @@ def test_a_burst_that_the_model_does_not_explain_is_named() -> None:
 def test_errors_everywhere_are_named_so() -> None:
     with pytest.raises(RecordingError, match="all over it"):
         check_fit(fit(load_config(), np.random.default_rng(1).normal(0.0, 0.003, len(_TIME_S))))
+
+
+@pytest.mark.parametrize(
+    ("key", "name"),
+    [
+        ("inertia_kg_m2", "time constant"),
+        ("coulomb_Nm", "Coulomb friction as duty"),
+        ("backlash_arcmin", "backlash"),
+        ("torque_constant_Nm_A", "gain"),
+    ],
+)
+def test_halves_that_disagree_are_named(key: str, name: str) -> None:
+    agreeing = fit(load_config(), np.zeros(len(_TIME_S)), (half(), half(**{key: 1.02})))
+    disagreeing = fit(load_config(), np.zeros(len(_TIME_S)), (half(), half(**{key: 1.5})))
+
+    check_fit(agreeing)
+    with pytest.raises(RecordingError, match=f"the halves of the recording disagree: {name} "):
+        check_fit(disagreeing)
 
 
 def motor(constant_Nm_A: float) -> TableConfig:
