@@ -9,6 +9,7 @@ from tools.bench.identify_tables import write_plant
 from tools.emulated import Motion, emulate
 from tools.identification.constants import Constant, coulomb_Nm
 from tools.identification.excitation import excitation
+from tools.identification.fit_checks import check_fit
 from tools.identification.identify_table import Identified, identify
 from tools.identification.recorder import record
 from tools.identification.recording import DriveRecording, WireRecording
@@ -17,6 +18,7 @@ from tools.tuning.linear_model import Teeth, speed_gain_deg_s, time_constant_s
 
 
 def assert_within_bounds(found: Identified, truth: TableConfig) -> None:
+    check_fit(found)
     assert speed_gain_deg_s(found.config) == pytest.approx(speed_gain_deg_s(truth), rel=0.05)
     assert time_constant_s(found.config, Teeth.DRIVING) == pytest.approx(
         time_constant_s(truth, Teeth.DRIVING), rel=0.05
@@ -31,9 +33,9 @@ def test_a_minute_over_the_wire_tells_the_constants_of_a_table_that_it_has_not_s
     found = identify(assumed, recording)
 
     assert_within_bounds(found, load_config(unseen))
-    told = {constant.name for constant in found.constants if constant.identifiable}
-    assert {"gain", "time constant", "Coulomb friction", "backlash"} <= told
-    assert "delay" not in told  # the line delays commands and readings alike
+    identifiable = {constant.name for constant in found.constants if constant.identifiable}
+    assert {"gain", "time constant", "Coulomb friction", "backlash"} <= identifiable
+    assert not {"viscous friction", "delay"} & identifiable  # the line delays commands and readings alike
 
 
 def test_a_long_ridge_is_followed_to_its_top(assumed: TableConfig, tmp_path: Path) -> None:
@@ -68,6 +70,7 @@ def test_a_drives_duty_tells_the_constants_more_sharply(assumed: TableConfig, un
 
     found = identify(assumed, drive_recording(truth, 32))
 
+    check_fit(found)
     constants: dict[str, Constant] = {constant.name: constant for constant in found.constants}
     assert constants["gain"].value == pytest.approx(speed_gain_deg_s(truth), rel=0.02)
     assert constants["time constant"].value == pytest.approx(1e3 * time_constant_s(truth, Teeth.DRIVING), rel=0.03)
