@@ -51,7 +51,7 @@ def _check_halves(found: Identified, name: str, unit: str, function: Derived) ->
         raise RecordingError(
             f"the halves of the recording disagree: {name} {values[0]:.4g} in the first, {values[1]:.4g} {unit} in the "
             f"second, {apart:.1f} standard deviations apart (allowed {_MOST_APART:g}): load, friction, table or clock "
-            "changed"
+            "changed, or gains, gears or encoder differ from --config"
         )
 
 
