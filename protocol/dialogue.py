@@ -171,6 +171,7 @@ class Dialogue:
         self._last_line = "nothing"
         self._unanswered[verb] += 1
         arrival_s = self._passed_s(line)
+        self.reference = self.reference.without_setting(verb)  # when an interrupt comes as the line is written
         self._write(line)
         self._take_for_carried_out(line, arrival_s)
 

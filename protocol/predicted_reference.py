@@ -49,6 +49,12 @@ class PredictedReference(NamedTuple):
             return self._replace(motion=None, target_deg=target_deg)
         return self._replace(motion=plan(*state, target_deg, top, rate), target_deg=target_deg, began_s=time_s)
 
+    def without_setting(self, verb: Verb) -> "PredictedReference":
+        """Return the prediction when it is open whether a command of this verb was carried out."""
+        if verb is Verb.SET_SPEED:
+            return self._replace(speed_deg_s=None)
+        return self._replace(acceleration_deg_s2=None) if verb is Verb.SET_ACCELERATION else self
+
     def seen(self, position_deg: float, begin_s: float, end_s: float) -> "PredictedReference":
         """Return what is left of the prediction after a reading of an instant between two times."""
         if self.motion is None:

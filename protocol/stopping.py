@@ -82,6 +82,8 @@ def _stopped(dialogue: Dialogue, braking_deg_s2: float) -> float:
         except (ReplyTimeout, UnexpectedReply):
             if attempt == _ATTEMPTS:
                 raise
+        for verb in (Verb.SET_SPEED, Verb.SET_ACCELERATION):  # a line was lost, or garbled: it is sent again
+            dialogue.reference = dialogue.reference.without_setting(verb)
     position_deg, _ = _position(dialogue)
     raise ArrivalTimeout(f"the table is at {position_deg:g} deg and goes on turning", position_deg)
 

@@ -184,6 +184,46 @@ def test_any_motion_on_any_table_is_stopped(data: st.DataObject, tmp_path_factor
     assert one.back_deg <= 1.0
 
 
+@pytest.mark.parametrize("line", [b"A 0.1\r", b"A 100.0\r", b"S 0.1\r", b"P -300.0\r"])
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_an_interrupt_as_a_line_is_written_leaves_open_whether_the_table_has_it(line: bytes, share: float) -> None:
+    client, table = table_at_rest()
+    client.move_to(300)
+    client.clock.sleep_s(2.0)
+    port = client.port
+    write = port.write
+
+    def interrupted(data: bytes) -> None:
+        port.write = write  # type: ignore[method-assign]  # as it was
+        write(data[: round(share * len(data))])
+        raise KeyboardInterrupt
+
+    port.write = interrupted  # type: ignore[method-assign]  # for one line
+    send = {b"A": client.set_acceleration, b"S": client.set_speed, b"P": client.move_to}[line[:1]]
+    with pytest.raises(KeyboardInterrupt):
+        send(float(line[2:]))
+    check(stopped(client, table))
+
+
+@pytest.mark.parametrize("lost", [b"A 100.0\r", b"S 40.0\r"])
+def test_a_setting_of_the_stop_that_is_lost_is_sent_again(lost: bytes) -> None:
+    client, table = table_at_rest()
+    client.set_acceleration(0.5)
+    client.set_speed(39.0)
+    client.move_to(1000)
+    client.clock.sleep_s(30.0)
+    port = client.port
+    write, losses = port.write, [lost]
+
+    def lossy(data: bytes) -> int | None:
+        return write(data.replace(losses.pop(), b"") if losses and losses[0] in data else data)
+
+    port.write = lossy  # type: ignore[method-assign]  # loses one line
+    one = stopped(client, table)
+    assert not losses
+    assert one.rest_s < 10.0  # 30 at the A that was in force
+
+
 def test_a_dead_line_is_told_with_what_the_table_will_do() -> None:
     client, table = table_at_rest()
     client.set_acceleration(5)
