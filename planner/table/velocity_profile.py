@@ -74,6 +74,8 @@ def stretches(state: ReferenceState, command: MotionCommand) -> Iterator[Stretch
 
 def advance(state: ReferenceState, command: MotionCommand, duration_s: float) -> ReferenceState:
     """Return where the reference is `duration_s` after a command; once it stands, exactly at the target."""
+    if math.isinf(command.target_deg):
+        return _go_on(state, command, duration_s)
     left_s = duration_s
     for stretch in stretches(state, command):
         if left_s < stretch.duration_s:
@@ -81,6 +83,17 @@ def advance(state: ReferenceState, command: MotionCommand, duration_s: float) ->
         state = move(state, stretch.acceleration_deg_s2, stretch.duration_s)
         left_s -= stretch.duration_s
     return ReferenceState(command.target_deg, 0.0)
+
+
+def _go_on(state: ReferenceState, command: MotionCommand, duration_s: float) -> ReferenceState:
+    """Return where the reference is on its way to a target that is infinitely far: one ramp, and then its S."""
+    target, top_speed, rate = command
+    angle, speed = state
+    top = math.copysign(top_speed, target)
+    ramp_s = abs(top - speed) / rate
+    if duration_s < ramp_s:
+        return move(state, math.copysign(rate, top - speed), duration_s)
+    return ReferenceState(angle + 0.5 * (speed + top) * ramp_s + top * (duration_s - ramp_s), top)
 
 
 def time_to_rest_s(state: ReferenceState, command: MotionCommand) -> float:

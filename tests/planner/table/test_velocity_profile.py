@@ -1,6 +1,7 @@
 """The profile against the firmware's own, tick by tick, and against Ruckig's time-optimal one."""
 
 import itertools
+import math
 
 import pytest
 from hypothesis import given, settings
@@ -43,6 +44,16 @@ def test_it_predicts_the_reference_of_the_stand_in_through_any_pre_emptions(
         assert status.reference_deg == pytest.approx(state.angle_deg, abs=1e-3)
         # Which tick a ramp ends in is open by one.
         assert status.reference_speed_deg_s == pytest.approx(state.speed_deg_s, abs=1e-3 * acceleration + 1e-2)
+
+
+@given(states, commands, st.sampled_from([1.0, -1.0]), st.floats(0.0, 200.0))
+@settings(max_examples=100, deadline=None)
+def test_a_target_that_is_infinitely_far_is_like_one_beyond_every_braking_way(
+    state: ReferenceState, command: MotionCommand, forward: float, duration_s: float
+) -> None:
+    far, farthest = (command._replace(target_deg=forward * angle) for angle in (1e5, math.inf))
+    there = advance(state, far, duration_s)
+    assert tuple(advance(state, farthest, duration_s)) == pytest.approx(tuple(there), abs=1e-6)
 
 
 @given(states, commands)
