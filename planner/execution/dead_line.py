@@ -37,12 +37,12 @@ class DeadLine(NamedTuple):
     first_location: int | None
 
     def __str__(self) -> str:
-        text = f"at most {self.longest_deg:.0f} deg until the table stood"
+        text = f"the table would run on by up to {self.longest_deg:.0f} deg, and"
         if self.first_s is None:
-            return f"{text}, at none of {self.moments} moments through a forbidden region"
+            return f"{text} cross a forbidden region at none of {self.moments} moments"
         return (
-            f"{text}, at {self.forbidden_moments} of {self.moments} moments through a forbidden region,"
-            f" the first at {self.first_s:.2f} s, location {self.first_location}"
+            f"{text} cross a forbidden region at {self.forbidden_moments} of {self.moments} moments;"
+            f" the first is at {self.first_s:.2f} s, location {self.first_location}"
         )
 
 

@@ -127,7 +127,7 @@ def test_a_region_that_only_the_way_on_meets_is_named_with_its_first_moment() ->
     # With the arm between 10 and 11 it may already stand at 11.
     assert verdict.first_location == 10
     assert verdict.first_s == pytest.approx(5.0, abs=0.03)
-    assert f"the first at {verdict.first_s:.2f} s, location 10" in str(verdict)
+    assert f"the first is at {verdict.first_s:.2f} s, location 10" in str(verdict)
 
 
 def test_a_region_beyond_the_way_on_does_not_count() -> None:
