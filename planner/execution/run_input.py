@@ -12,7 +12,7 @@ from planner.errors import ArmTableError, PlannerError, PoseError
 from planner.kinematics.configuration import Configuration
 from planner.map.map_file import MAP_FILE, load_maps
 from planner.planning.arm_check import PlannedArm, arm_fault
-from planner.planning.plan import Plan
+from planner.planning.plan import Plan, path_cost
 from planner.planning.plan_file import load_plan
 from planner.planning.problem import Problem
 from planner.planning.verification import verify
@@ -45,6 +45,12 @@ class RunInput:
     joints_deg: FloatArray
     document: dict[str, Any]
 
+    def with_cost(self) -> "RunInput":
+        """Return the same with the cost that the motion has, whatever the file says."""
+        plan = self.plan
+        motion = plan.angles_deg, plan.speeds_deg_s, plan.accelerations_deg_s2
+        return replace(self, plan=replace(plan, cost=path_cost(self.problem, *motion, plan.pauses)))
+
     def turned(self, turns: int) -> "RunInput":
         """Return the same scan, full turns of the table farther."""
         plan = self.plan
@@ -69,7 +75,7 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
     try:
         document = read_json(plan_file)
         name = str(document["provenance"]["scan"])
-        limits = Limits(**{key: float(value) for key, value in document["limits"].items()})
+        limits = Limits(*(float(document["limits"][name]) for name in Limits._fields))
         weights = Weights(float(document["weights"]["k_a"]), float(document["weights"]["k_w"]))
         digest = document["provenance"]["map"].get("digest")
         if "arm" not in document:
@@ -94,7 +100,7 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
     run_input = RunInput(name, plan, problem, planned_arm.joints_deg, document)
     _check(plan_file, run_input)
     _check_arm(plan_file, run_input, planned_arm)
-    return run_input
+    return run_input.with_cost()
 
 
 def _check(plan_file: Path, run_input: RunInput) -> None:

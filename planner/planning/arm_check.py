@@ -54,6 +54,9 @@ def arm_fault(planned: PlannedArm, plan: Plan) -> str | None:
     fault = first_joint_fault(cell.arm, joints_deg, plan.step_s, [pause.step for pause in plan.pauses])
     if fault is not None:
         return str(fault)
+    without = np.flatnonzero(~np.isfinite(T_WS).all(axis=(1, 2)))
+    if len(without):
+        return f"at location {int(without[0])} there is no pose of the probe"
     joints = cell.arm.joints(joints_deg)
     goals = cell.table_factors(plan.angles_deg) @ cell.location_factors(T_WS)
     off = np.abs(cell.arm.flange_poses(joints) - goals)

@@ -115,7 +115,7 @@ def read_record(path: Path) -> Record:
         cases = tuple(
             RecordedCase(case["id"], tuple(_event(*event) for event in case["wire"])) for case in record["cases"]
         )
-        return Record(profile_from(record["profile"], str(path)), int(record["home_deg"]), cases)
+        return Record(profile_from(record["profile"], str(path)), round(float(record["home_deg"])), cases)
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         if isinstance(error, ProfileError):
             raise RecordError(str(error)) from error

@@ -1,6 +1,7 @@
 """What `run` refuses before anything moves, through the command line, on a stand-in that is asked where it is."""
 
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -107,6 +108,20 @@ REFUSED: dict[str, tuple[Change, str]] = {
     "a pause that hides a jump": (call_a_step_a_pause, "has been edited: the pause in step 7 contradicts the angles"),
     "an earlier version's plan": (lambda plan: plan.pop("arm"), "plan anew with python -m planner plan short --out"),
     "an arm that is none": (lambda plan: plan["arm"]["d_mm"].pop(), "must hold 6 finite numbers"),
+    "a pose that is none": (
+        lambda plan: plan["locations"][8][1].__setitem__(3, None),
+        "at location 8 there is no pose of the probe",
+    ),
+    "a pose that is infinitely far": (
+        lambda plan: plan["locations"][8][1].__setitem__(3, math.inf),
+        "at location 8 there is no pose of the probe",
+    ),
+    "a number that is none": (
+        lambda plan: plan["cell"]["T_BT"][0].__setitem__(3, 10**400),
+        "is damaged: OverflowError",
+    ),
+    "an angle that is none": (lambda plan: plan["table"]["angles_deg"].__setitem__(0, 10**400), "holds no plan that"),
+    "a limit that is missing": (lambda plan: plan["limits"].pop("speed_deg_s"), "is damaged: KeyError, 'speed_deg_s'"),
     "no poses": (lambda plan: plan.pop("locations"), "is damaged: KeyError, 'locations'"),
 }
 
@@ -137,9 +152,12 @@ def test_the_example_that_the_refusals_change_is_a_plan_that_runs(tmp_path: Path
     plan_file = write_short_scan(tmp_path)
     assert main(["run", str(plan_file), "--port", "emulator://", "--out", str(tmp_path / "run")]) == 0
     document = json.loads(plan_file.read_text(encoding="utf-8"))
+    cost = document["cost"]
     moved(6, -359.0)(document)
+    document["cost"] = {"acceleration": math.nan, "speed": "low", "value": None, "pauses": 1e9, "total": 0.0}
     plan_file.write_text(json.dumps(document), encoding="utf-8")
     assert main(["run", str(plan_file), "--port", "emulator://", "--out", str(tmp_path / "run")]) == 0
+    assert json.loads((tmp_path / "run" / "run.json").read_text(encoding="utf-8"))["cost"]["planned"] == cost
 
 
 def names_in(folder: Path) -> set[str]:
