@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from protocol.quiet_start import end_quietly
+from protocol.quiet_start import IS_PROGRAM, end_quietly
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 _Handler = Callable[[int, FrameType | None], object] | int | None
@@ -53,7 +53,8 @@ def ended_by_signals() -> Iterator[Ending]:
     """Let each of the signals break into the block as a KeyboardInterrupt; a block within another shares its signals.
 
     After the first, signals are dropped until a block of `signals_wait` has ended: a table that is being stopped then
-    stands. A signal that is ignored, or has a handler of the caller's own, keeps that. At the end all are put back.
+    stands. A signal that is ignored, or has a handler of the caller's own, keeps that. At the end all are put back; in
+    a program that a signal has ended, they are ignored, so that none changes its exit status while it is unloaded.
     """
     if _endings:
         yield _endings[-1]
@@ -70,7 +71,8 @@ def ended_by_signals() -> Iterator[Ending]:
         yield ending
     finally:
         _endings.remove(ending)
-        _put_back(before)
+        is_over = IS_PROGRAM and ending.number is not None
+        _put_back(dict.fromkeys(before, signal.SIG_IGN) if is_over else before)
 
 
 @contextmanager

@@ -32,7 +32,8 @@ def end_quietly(number: int, _: FrameType | None) -> None:
     os._exit(128 + number)
 
 
-_is_ours = module_run(sys.orig_argv).partition(".")[0] in _PROGRAMS
+IS_PROGRAM = module_run(sys.orig_argv).partition(".")[0] in _PROGRAMS
+"""Whether this process is a program of this project, and no other that uses it."""
 # Ignored signals (nohup, `&` in a script) stay so.
-if _is_ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+if IS_PROGRAM and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, end_quietly)

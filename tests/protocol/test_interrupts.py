@@ -1,8 +1,10 @@
 import signal
 import threading
+from contextlib import suppress
 
 import pytest
 
+from protocol import interrupts
 from protocol.interrupts import ended_by_signals, said, signals_wait, status_after
 from protocol.quiet_start import module_run
 
@@ -73,6 +75,23 @@ def test_a_block_within_another_shares_its_signals() -> None:
         with ended_by_signals() as inner, pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGTERM)
         assert inner.status(0) == outer.status(0) == 143
+
+
+def test_a_program_that_a_signal_has_ended_is_unloaded_in_peace(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(interrupts, "IS_PROGRAM", True)
+    formers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        with ended_by_signals():
+            pass
+        assert {number: signal.getsignal(number) for number in formers} == formers
+        with ended_by_signals() as ending, suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGTERM)
+        assert ending.status(0) == 143
+    finally:
+        for number, former in formers.items():
+            signal.signal(number, former)
 
 
 @pytest.mark.parametrize("handler", [signal.SIG_IGN, lambda _number, _frame: None])
