@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.execution.free_way import is_free
-from planner.execution.run_record import Sent
+from planner.execution.run_record import Record, Sent
 from planner.execution.table_motion import Leg, Phase, TableMotion
 from planner.map.config_map import ConfigurationMap
 from planner.table.velocity_profile import ReferenceState, advance, way_to_rest_deg
@@ -46,20 +46,17 @@ class DeadLine(NamedTuple):
         )
 
 
-def judge_dead_line(
-    configuration_map: ConfigurationMap, motion: TableMotion, sent: Sequence[Sent], until_s: float
-) -> DeadLine:
+def judge_dead_line(configuration_map: ConfigurationMap, motion: TableMotion, record: Record) -> DeadLine:
     """Return what would have happened if the line had died at any moment of a run.
 
     Args:
         configuration_map: where the table may be with the arm at a location.
         motion: what the table should do.
-        sent: the commands that were sent.
-        until_s: when the run ended.
+        record: what was sent to the table and seen of it.
     """
     longest_deg, moments = 0.0, 0
     forbidden: list[tuple[float, int]] = []
-    for time_s, lowest_deg, at_deg, highest_deg in _ways_to_rest(motion, sent, until_s):
+    for time_s, lowest_deg, at_deg, highest_deg in _ways_to_rest(motion, record.sent, _end_s(motion, record)):
         moments += 1
         longest_deg = max(longest_deg, highest_deg - at_deg, at_deg - lowest_deg)
         leg = motion.leg_at(time_s)
@@ -67,6 +64,15 @@ def judge_dead_line(
             forbidden.append((time_s, leg.column))
     first_s, first_location = forbidden[0] if forbidden else (None, None)
     return DeadLine(longest_deg, moments, len(forbidden), first_s, first_location)
+
+
+def _end_s(motion: TableMotion, record: Record) -> float:
+    """Return when a run ended: with its motion, or when the table was stopped."""
+    if record.failure is None:
+        return motion.end_s
+    last_sent_s = record.sent[-1].time_s if record.sent else motion.start_s
+    last_seen_s = record.observations[-1].time_s if record.observations else motion.start_s
+    return min(max(last_sent_s, last_seen_s), motion.end_s)
 
 
 def _arm_at(leg: Leg) -> tuple[int, ...]:

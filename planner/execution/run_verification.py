@@ -136,17 +136,8 @@ def verify_run(
         executed_cost=_executed_cost(run_input, motion, located) if known else None,
         latest_command_s=max((sent.late_s for sent in record.sent), default=0.0),
         tolerance_deg=tolerance_deg,
-        dead_line=judge_dead_line(problem.map, motion, record.sent, _end_s(motion, record)),
+        dead_line=judge_dead_line(problem.map, motion, record),
     )
-
-
-def _end_s(motion: TableMotion, record: Record) -> float:
-    """Return when a run ended: with its motion, or when the table was stopped."""
-    if record.failure is None:
-        return motion.end_s
-    last_sent_s = record.sent[-1].time_s if record.sent else motion.start_s
-    last_seen_s = record.observations[-1].time_s if record.observations else motion.start_s
-    return min(max(last_sent_s, last_seen_s), motion.end_s)
 
 
 class _Series(NamedTuple):

@@ -69,7 +69,7 @@ class LatchedRun:
         tells_truth: Whether the port gives these four.
         triggers: How many profiles the probe took along the path.
         dropped: Why the other profiles have no pose, by their number.
-        failure: Why the motion ended early; None when it came to its end.
+        record: What was sent to the table and seen of it.
     """
 
     numbers: IndexArray
@@ -84,7 +84,12 @@ class LatchedRun:
     tells_truth: bool
     triggers: int
     dropped: dict[int, Drop]
-    failure: str | None
+    record: Record
+
+    @property
+    def failure(self) -> str | None:
+        """Why the motion ended early; None when it came to its end."""
+        return self.record.failure
 
 
 class ReadingMotion(TableMotion):
@@ -175,7 +180,7 @@ def run_latched(
         tells_truth=line.truth() is not None,
         triggers=len(on_path),
         dropped=pairing.dropped,
-        failure=record.failure,
+        record=record,
     )
 
 

@@ -28,6 +28,7 @@ def scan_document(scanned: Scanned) -> dict[str, Any]:
             "rate_hz": options.triggers.rate_hz,
             "seed": options.seed,
         },
+        "dead_line": scanned.dead_line._asdict(),
         "configuration": scanned.planned.plan.configuration,
         "failure": run.failure or ("interrupted" if scanned.is_interrupted else None),
         "points": scanned.points,

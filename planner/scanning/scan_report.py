@@ -72,6 +72,7 @@ def _summary(scanned: Scanned) -> Iterator[tuple[str, str]]:
     yield "probe", f"{options.triggers.rate_hz:g} profiles a second, {scanned.probe.points_per_line} points each"
     yield "workpiece", f"{len(scanned.scan.mesh.faces):,} triangles"
     yield "seed", f"{options.seed}"
+    yield "if the line had died", f"{scanned.dead_line}"
 
 
 def _distances(accounted: Account) -> tuple[str, ...]:

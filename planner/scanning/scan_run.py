@@ -18,12 +18,17 @@ from planner.cell.cell import placement
 from planner.cell.scan import Scan
 from planner.cell.unit_hints import unit_hint
 from planner.errors import PlannerError
+from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.execution.execute import Settings
+from planner.execution.free_way import check_ends
 from planner.execution.inside_view import ControlView
 from planner.execution.run_on import DEFAULT_RUN_ON_DEG
+from planner.execution.stream import check_it_fits, stream
+from planner.execution.table_motion import TableMotion
 from planner.execution.table_port import open_port
 from planner.geometry.ray_casting import RayCaster
 from planner.kinematics.configuration import Configuration
+from planner.map.config_map import ConfigurationMap
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
 from planner.planning.arm_check import PlannedArm, arm_fault
@@ -83,11 +88,17 @@ class ScanOptions(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """The motion of a scan: the table's plan, and the arm's joints `(n + 1, 6)` in deg along it."""
+    """The motion of a scan: the table's plan on its map, and the arm's joints `(n + 1, 6)` in deg along it."""
 
     plan: Plan
     joints_deg: FloatArray
     limits: Limits
+    map: ConfigurationMap
+
+    @property
+    def motion(self) -> TableMotion:
+        """What the table does."""
+        return TableMotion(self.plan, self.limits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +142,11 @@ class Scanned:
     is_interrupted: bool
 
     @property
+    def dead_line(self) -> DeadLine:
+        """How far the table would have run on if the line had died, and into what."""
+        return judge_dead_line(self.planned.map, self.planned.motion, self.run.record)
+
+    @property
     def is_whole(self) -> bool:
         """Whether the motion and the measuring came to their ends."""
         return self.run.failure is None and not self.is_interrupted
@@ -158,17 +174,20 @@ def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: Progre
     fault = arm_fault(PlannedArm(scan.cell, scan.path.T_WS, joints_deg), plan)
     if fault is not None:
         raise ScanError(f"{scan.name}: the arm cannot follow the plan: {fault}")
-    return Planned(plan, joints_deg, scan.limits)
+    return Planned(plan, joints_deg, scan.limits, maps[Configuration.parse(comparison.best)])
 
 
 def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) -> LatchedRun:
     """Return what was latched while the table at the port made the motion.
 
     Raises:
-        PlannerError: The port lets no trigger through, the commands do not fit it, or nothing was scanned.
+        PlannerError: The port lets no trigger through, the commands do not fit it, the table would run up or out
+            through a forbidden region, or nothing was scanned.
         TableError: The table does not answer, or did not come to the start.
     """
     wire = Wire(options.decimals, options.baud)
+    check_ends(planned.map, planned.motion)
+    check_it_fits(stream(planned.motion, planned.limits, wire, options.run_on_deg), wire)
     port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
     with ExitStack() as open_things:
         timeout_s = options.timeout_s * options.time_scale

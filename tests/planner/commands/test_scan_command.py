@@ -11,11 +11,16 @@ import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.__main__ import main
 from planner.arrays import FloatArray
 from planner.cell.scan import load_scan, shipped_scans
+from planner.execution.free_way import WayError
+from planner.map.synthetic_maps import blocks_map
 from planner.planning.arm_motion import ArmMotion, arm_motion
+from planner.planning.plan import Plan
 from planner.scanning import scan_run
 from planner.scanning.scan_file import scan_document
 from planner.scanning.scan_report import scan_report
-from planner.scanning.scan_run import ScanOptions, scan_workpiece
+from planner.scanning.scan_run import Planned, ScanOptions, run_on_port, scan_workpiece
+from planner.table.cost import PathCost
+from planner.table.motion import Limits
 
 SMALL = """
 [cell]
@@ -62,9 +67,13 @@ def test_a_shipped_scan_gives_a_cloud_on_the_part_and_a_report(
     assert 0.0 < document["distance_mm"]["sigma"] < 0.2
     assert document["coverage"]["seen"] > 0.05
     assert document["error_mm"]["all_off"] < 1e-9
+    dead_line = document["dead_line"]
+    assert 0.0 < dead_line["longest_deg"] < 91.0
+    assert 0 <= dead_line["forbidden_moments"] < dead_line["moments"]
     assert len(cloud(tmp_path / "new")) == document["points"]
     shown = capsys.readouterr()
     assert f"{document['points']:,} points" in shown.out
+    assert f"dead line  the table would run on by up to {dead_line['longest_deg']:.0f} deg" in shown.out
     assert shown.err == ""  # a pipe shows no progress
     page = (tmp_path / "new" / "report.html").read_text()
     assert page.count("data:image/png;base64,") == 3
@@ -218,3 +227,23 @@ def test_a_scan_whose_arm_path_breaks_a_limit_is_refused_before_the_port_is_open
     assert "the arm cannot follow the plan: at location 0 joint 6 is at" in shown.err
     assert len(shown.err.splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_motion_that_the_line_cannot_carry_is_refused_before_the_port_is_opened(
+    scan_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scan_run, "open_port", lambda *_: pytest.fail("the port was opened"))
+    assert main(["scan", scan_file, *QUICK, "--exact-calibration", "--baud", "300", "--out", str(tmp_path)]) == 2
+    assert "ms at 300 baud" in capsys.readouterr().err
+
+
+def test_a_run_up_through_a_forbidden_region_is_refused_before_the_port_is_opened(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    speeds = np.full(16, 20.0)
+    plan = Plan("", "", 0.1, 100.0 + 2.0 * np.arange(16), speeds, np.zeros(15), PathCost(0.0, 0.0, 0.0))
+    just_before = blocks_map(16, 360, [(0, 0, 96, 98)], edge=1)
+    monkeypatch.setattr(scan_run, "open_port", lambda *_: pytest.fail("the port was opened"))
+    planned = Planned(plan, np.zeros((16, 6)), Limits(), just_before)
+    with pytest.raises(WayError, match="run-up at location 0 takes the table from 9"):
+        run_on_port(planned, ScanOptions(), lambda _: None)

@@ -66,7 +66,7 @@ def test_after_a_cut_at_any_moment_a_shipped_plan_runs_on_by_less_than_is_promis
     assert record.failure is None
     assert len(ways_deg) > 30
     assert max(ways_deg) <= 90.0
-    judged = judge_dead_line(run_input.problem.map, motion, record.sent, motion.end_s)
+    judged = judge_dead_line(run_input.problem.map, motion, record)
     assert max(ways_deg) - 0.5 <= judged.longest_deg <= 90.0
 
 
@@ -109,7 +109,7 @@ def judged(configuration_map: ConfigurationMap) -> Any:  # noqa: ANN401 - the re
     motion = steady_motion()
     table = TableClient(FaultyPort(), timeout_s=0.5)
     record = execute(table, motion, Limits(), Wire())
-    return judge_dead_line(configuration_map, motion, record.sent, motion.end_s)
+    return judge_dead_line(configuration_map, motion, record)
 
 
 def test_a_way_on_that_stays_free_is_said_to() -> None:
@@ -142,7 +142,7 @@ def test_the_arm_that_is_drawn_back_in_a_pause_is_in_no_ones_way() -> None:
     across: Callable[[int, int], ConfigurationMap] = lambda first, last: blocks_map(  # noqa: E731 - short
         16, 360, [(first, last, there + 20, there + 25)]
     )
-    assert judge_dead_line(across(9, 10), motion, record.sent, motion.end_s).forbidden_moments == 0
+    assert judge_dead_line(across(9, 10), motion, record).forbidden_moments == 0
 
 
 def _at(angle_deg: float) -> FaultyPort:
@@ -153,5 +153,5 @@ def _at(angle_deg: float) -> FaultyPort:
 
 def test_a_run_without_commands_has_no_moments() -> None:
     motion = steady_motion()
-    verdict = judge_dead_line(ConfigurationMap(np.ones((21, 360))), motion, [], motion.end_s)
+    verdict = judge_dead_line(ConfigurationMap(np.ones((21, 360))), motion, Record())
     assert (verdict.moments, verdict.longest_deg) == (0, 0.0)

@@ -8,6 +8,7 @@ import trimesh
 from planner.arrays import FloatArray
 from planner.cell.cell import Cell, placement
 from planner.cell.scan_path import looking_at
+from planner.execution.run_record import Record
 from planner.geometry.ray_casting import RayCaster
 from planner.geometry.transforms import rigid_inverse
 from planner.kinematics.arm import Arm
@@ -46,7 +47,7 @@ def made_up_chain(
     times_s = np.linspace(0.0, 24.0, PROFILES)
     run = LatchedRun(
         np.arange(PROFILES), times_s, numbers, latched_deg.round(decimals), numbers,
-        true_deg, edge_deg, shaft_deg, latched_deg, True, PROFILES, {}, None,
+        true_deg, edge_deg, shaft_deg, latched_deg, True, PROFILES, {}, Record(),
     )  # fmt: skip
     known = replace(TRUE, T_FS=TRUE.T_FS @ placement(off_mm, 0.0, 0.0, 0.0, 0.0, 0.0))
     return Chain(run, TRUE, known, lambda joints: T_BF[joints[:, 0].astype(int)])
