@@ -27,6 +27,8 @@ from protocol.interrupts import signals_wait
 _SLACK_S = 0.005
 # From the call to the first command, beside what its lines take.
 _PREPARATION_S = 0.1
+# A table that rests shows so within this time, however late it answers.
+_RESTING_S = 3.0
 # As long as any command: what its lines take at most.
 _ANY_COMMAND = MotionCommand(-100.0, 10.0, 10.0)
 
@@ -129,6 +131,20 @@ def _stopped(table: TableClient) -> str:
     with suppress(KeyboardInterrupt), signals_wait():
         report = table.stop_and_report()
     return report
+
+
+def resting_deg(table: TableClient, wire: Wire) -> float:
+    """Return where the table rests, before anything is sent that moves it.
+
+    Raises:
+        ExecutionError: it turns, so nobody knows by which way it would come to the start.
+    """
+    try:
+        return table.wait_until_at(table.position_deg(), wire.quantum, _RESTING_S)
+    except ArrivalTimeout as error:
+        raise ExecutionError(
+            f"the table is at {error.position_deg:g} deg and turns already; wait until it stands, then try again"
+        ) from error
 
 
 def bring_to(table: TableClient, angle_deg: float, limits: Limits, wire: Wire, tolerance_deg: float = 0.1) -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.execution.execute import Settings, bring_to, execute
+from planner.execution.execute import Settings, bring_to, execute, resting_deg
 from planner.execution.free_way import check_ends, nearest_turns, turns_to_start
 from planner.execution.inside_view import ControlView, InsideView, view_of
 from planner.execution.robot_motion import robot_motion, turning_time_s
@@ -95,7 +95,7 @@ def run_plan(
     with ExitStack() as stack:
         table, view = _open(options, stack)
         table_began_s, wall_began_s = table.clock.now_s(), time.perf_counter()
-        turns = _turns(run_input, motion, table.position_deg(), options.arm_is_away)
+        turns = _turns(run_input, motion, resting_deg(table, wire), options.arm_is_away)
         run_input = run_input.turned(turns)
         motion = TableMotion(run_input.plan, limits, options.pause_times)
         bring_to(table, motion.start_deg, limits, wire)
@@ -105,12 +105,24 @@ def run_plan(
     conditions = RunConditions(
         options.port, wire, options.lead_s, options.tolerance_deg, turns, options.pause_times, options.run_on_deg
     )
-    checked = verify_run(run_input, motion, record, options.lead_s, options.tolerance_deg)
+    stored = StoredRun(run_input, conditions, motion, record)
+    try:
+        return Finished(_written(out, plan_file, map_file, stored), duration)
+    except KeyboardInterrupt as interrupt:
+        if record.failure is not None:
+            interrupt.add_note(record.failure)
+        raise
+
+
+def _written(out: Path, plan_file: Path, map_file: Path, stored: StoredRun) -> RunVerification:
+    """Verify a run, write all that is known of it, and return what it came to."""
+    run_input, conditions, motion, record = stored
+    checked = verify_run(run_input, motion, record, conditions.lead_s, conditions.tolerance_deg)
     copy_input(out, plan_file, map_file)
     save_run(out, run_input, conditions, motion, record, checked)
     save_robot(out, robot_motion(motion, run_input.joints_deg), record)
-    plot_run(StoredRun(run_input, conditions, motion, record), checked, out / "run.png")
-    return Finished(checked, duration)
+    plot_run(stored, checked, out / "run.png")
+    return checked
 
 
 def _with_time_for_the_arm(pause_times: PauseTimes, run_input: RunInput) -> PauseTimes:

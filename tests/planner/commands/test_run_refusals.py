@@ -15,6 +15,7 @@ from planner.__main__ import main
 from planner.execution.inside_view import ControlView, Look
 from planner.kinematics.configuration import Configuration
 from planner.kinematics.inverse_kinematics import inverse_kinematics
+from protocol import TableClient
 from tests.planner.run_examples import CELL, JOINTS_DEG, LOCATIONS, scan_locations, write_short_scan
 
 Document = dict[str, Any]
@@ -158,6 +159,28 @@ def test_the_example_that_the_refusals_change_is_a_plan_that_runs(tmp_path: Path
     plan_file.write_text(json.dumps(document), encoding="utf-8")
     assert main(["run", str(plan_file), "--port", "emulator://", "--out", str(tmp_path / "run")]) == 0
     assert json.loads((tmp_path / "run" / "run.json").read_text(encoding="utf-8"))["cost"]["planned"] == cost
+
+
+def test_a_table_that_turns_already_is_not_moved(
+    stand_in: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    port, control = stand_in
+    plan_file = write_short_scan(tmp_path)
+    with TableClient.open(port) as table:
+        table.set_speed(20.0)
+        table.move_by(1000.0)
+        table.clock.sleep_s(0.5)
+    try:
+        arguments = ["--port", port, "--control", str(control), "--out", str(tmp_path / "run"), "--arm-away"]
+        assert main(["run", str(plan_file), *arguments]) == 2
+        said = capsys.readouterr().err
+        assert "deg and turns already; wait until it stands" in said
+        assert said.count("\n") == 1
+        assert names_in(tmp_path / "run") == set()
+    finally:
+        with TableClient.open(port) as table:
+            table.set_acceleration(100.0)
+            table.stop()
 
 
 def names_in(folder: Path) -> set[str]:

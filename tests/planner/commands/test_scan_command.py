@@ -241,7 +241,7 @@ def test_a_run_up_through_a_forbidden_region_is_refused_before_the_port_is_opene
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     speeds = np.full(16, 20.0)
-    plan = Plan("", "", 0.1, 100.0 + 2.0 * np.arange(16), speeds, np.zeros(15), PathCost(0.0, 0.0, 0.0))
+    plan = Plan("", "", 0.1, np.arange(100.0, 132.0, 2.0), speeds, np.zeros(15), PathCost(0.0, 0.0, 0.0))
     just_before = blocks_map(16, 360, [(0, 0, 96, 98)], edge=1)
     monkeypatch.setattr(scan_run, "open_port", lambda *_: pytest.fail("the port was opened"))
     planned = Planned(plan, np.zeros((16, 6)), Limits(), just_before)
