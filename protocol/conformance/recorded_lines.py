@@ -9,11 +9,14 @@ from protocol.conformance.record import RecordedCase
 from protocol.conformance.replay import AFTER_S
 from protocol.conformance.wire import CR
 
+BEGIN = "begin"
 _SPACES = re.compile(rb" +")
 
 
 class Line(NamedTuple):
     """A line without its CR, at the time at which that arrives; or a deed beside the wire, which has no text.
+
+    The deed `BEGIN` begins a case, whether lines follow or not.
 
     A line is whole when its beginning cannot have been forgotten by a table that saw its client go.
     """
@@ -32,6 +35,7 @@ def recorded_lines(cases: Iterable[RecordedCase], profile: Profile) -> Iterator[
     for case in cases:
         now_s, origin_s = begin_s, case.wire[0].time_s
         forgotten, half = forgotten + half, b""  # the replay cancels it
+        yield Line(case.id, begin_s, b"", BEGIN)
         for event in case.wire:
             now_s = max(now_s, begin_s + event.time_s - origin_s)
             if event.direction == "beside":

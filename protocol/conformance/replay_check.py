@@ -11,7 +11,7 @@ from typing import NamedTuple
 from protocol.conformance.possible_commands import certain_command, glued, possible_commands
 from protocol.conformance.profile import Profile
 from protocol.conformance.record import RecordedCase
-from protocol.conformance.recorded_lines import Line, crowded_lines, recorded_lines
+from protocol.conformance.recorded_lines import BEGIN, Line, crowded_lines, recorded_lines
 from protocol.messages import Command, Verb
 from protocol.trapezoid import Motion, plan
 
@@ -88,11 +88,7 @@ class _Walk:
 
     def take(self, lines: Sequence[Line]) -> Misfit | None:
         """Follow the lines, and return the first that does not fit."""
-        case = None
         for index, line in enumerate(lines):
-            if line.case != case:
-                case = line.case
-                self._begin_case(line.time_s)
             late_s = self._late_s * self._delays[index % len(self._delays)]
             reason = self._deed(line) if line.deed else self._line(line._replace(time_s=line.time_s + late_s))
             if reason:
@@ -209,7 +205,13 @@ class _Walk:
         return abs(value) > range_deg or min(ways) > range_deg
 
     def _deed(self, line: Line) -> str:
-        """Take what is done beside the wire: the table is switched off and on, and calls its place another number."""
+        """Take the begin of a case, or what is done beside the wire: the table is switched off and on.
+
+        Then it calls its place another number.
+        """
+        if line.deed == BEGIN:
+            self._begin_case(line.time_s)
+            return ""
         word, _, count = line.deed.partition(" ")
         if word not in {"power_cycle", "preset"}:
             return ""

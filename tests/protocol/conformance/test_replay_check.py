@@ -54,6 +54,14 @@ def test_what_fits_is_sent(name: str, careful: Profile) -> None:
     assert isinstance(found(careful, FITS[name]), list)
 
 
+@pytest.mark.parametrize("second", [sent(b""), [Event(0.0, "received", b"H 1.0\r")], sent(b"H\r")])
+def test_each_case_has_its_start_whether_it_has_lines_or_not(second: Sequence[Event], careful: Profile) -> None:
+    wires = sent(b"P 1\r"), second, sent(b"P 2\r"), sent(b"H\r")
+    assert found(careful, *wires) == [0.0, 1.0, 1.0, 2.0]
+    cases = [RecordedCase("the same", tuple(wire)) for wire in wires]
+    assert check(cases, 0.0, careful) == [0.0, 1.0, 1.0, 2.0]
+
+
 MISFITS = {
     "too far": sent(b"P 5.1\r"),
     "too fast": sent(b"S 2.1\r"),
