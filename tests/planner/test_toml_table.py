@@ -39,7 +39,7 @@ def test_an_absent_key_takes_its_default() -> None:
         (lambda t: t.number("key", above=0.0), 0, "cell.toml: key is 0; it must be a finite number above 0"),
         (lambda t: t.number("key", at_least=1.0, at_most=2.0), 3, "key is 3; .* at least 1 and at most 2"),
         (lambda t: t.number("key"), float("inf"), "key is inf; it must be a finite number"),
-        (lambda t: t.number("key"), 10**400, "key is 10+; it must be a finite number"),
+        (lambda t: t.number("key"), 10**400, r"key is 10+\.\.\.; it must be a finite number"),
         (lambda t: t.number("key"), True, "key is True"),
         (lambda t: t.numbers("key", 2), [1], r"key is \[1\]; it must be a list of 2 finite numbers"),
         (lambda t: t.numbers("key", 1), ["1"], r"key is \['1'\]"),
