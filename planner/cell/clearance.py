@@ -147,7 +147,7 @@ def _place_housing(bodies: FloatArray, body: int, frames: FloatArray, placed: Fl
 @kernel
 def nearest_pair(
     pairs: IndexArray, bodies: FloatArray, obstacles: FloatArray,
-    field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
+    field_values: npt.NDArray[np.float32], field_levels: FloatArray,
     placed: FloatArray, obstacle_frames: FloatArray, angle: int, first: int, last: int, enough_mm: float,
 ) -> tuple[float, int]:  # fmt: skip
     """Return the least clearance in mm of the pairs `first` to `last` - 1 and the pair that has it.
@@ -159,8 +159,7 @@ def nearest_pair(
         bodies: See `CollisionModel`.
         obstacles: See `CollisionModel`.
         field_values: The model's field.
-        field_origin: Its origin.
-        field_spacing: Its spacing.
+        field_levels: Its grids.
         placed: `(n_bodies, PLACED)`, see `place_bodies`.
         obstacle_frames: `(n_angles, n_obstacles, 3, 4)`, see `base_in_obstacles`.
         angle: Which of the table angles.
@@ -189,12 +188,12 @@ def nearest_pair(
                 continue
             if body == beam - 1:
                 distance = _housing_from_obstacle(
-                    obstacles, field_values, field_origin, field_spacing,
+                    obstacles, field_values, field_levels,
                     placed, body, obstacle_frames, angle, i, bound + radius,
                 )  # fmt: skip
             else:
                 distance = _body_from_obstacle(
-                    obstacles, field_values, field_origin, field_spacing,
+                    obstacles, field_values, field_levels,
                     placed, body, obstacle_frames, angle, i, bound + radius,
                 )  # fmt: skip
         # Not by the difference: it would take a distance that is only known to be enough for a smaller one.
@@ -233,14 +232,14 @@ def _body_distance(placed: FloatArray, a: int, b: int) -> float:
 
 @kernel
 def _body_from_obstacle(
-    obstacles: FloatArray, field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
+    obstacles: FloatArray, field_values: npt.NDArray[np.float32], field_levels: FloatArray,
     placed: FloatArray, body: int, frames: FloatArray, angle: int, i: int, enough_mm: float,
 ) -> float:  # fmt: skip
     ax, ay, az = _in_frame(frames, angle, i, placed, body, 0)
     bx, by, bz = _in_frame(frames, angle, i, placed, body, 3)
     kind = int(obstacles[i, KIND])
     if kind == FIELD:
-        return field_distance(field_values, field_origin, field_spacing, ax, ay, az, bx, by, bz, enough_mm)
+        return field_distance(field_values, field_levels, ax, ay, az, bx, by, bz, enough_mm)
     return solid_distance(
         kind, obstacles[i, SIZE], obstacles[i, SIZE + 1], obstacles[i, SIZE + 2],
         ax, ay, az, bx, by, bz, enough_mm,
@@ -249,7 +248,7 @@ def _body_from_obstacle(
 
 @kernel
 def _housing_from_obstacle(
-    obstacles: FloatArray, field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
+    obstacles: FloatArray, field_values: npt.NDArray[np.float32], field_levels: FloatArray,
     placed: FloatArray, housing: int, frames: FloatArray, angle: int, i: int, enough_mm: float,
 ) -> float:  # fmt: skip
     x, y, z = _in_frame(frames, angle, i, placed, housing, _MIDDLE)
@@ -258,7 +257,7 @@ def _housing_from_obstacle(
     wx, wy, wz = _turned(frames, angle, i, placed, housing, _THIRD)
     return box_distance_bound(
         int(obstacles[i, KIND]), obstacles[i, SIZE], obstacles[i, SIZE + 1], obstacles[i, SIZE + 2],
-        field_values, field_origin, field_spacing, x, y, z, ux, uy, uz, vx, vy, vz, wx, wy, wz, enough_mm,
+        field_values, field_levels, x, y, z, ux, uy, uz, vx, vy, vz, wx, wy, wz, enough_mm,
     )  # fmt: skip
 
 
@@ -327,7 +326,7 @@ def _in_frame(
 @kernel
 def _clearance_of_each(
     arm: FloatArray, joints: FloatArray, beam_mm: float, pairs: IndexArray, bodies: FloatArray, obstacles: FloatArray,
-    field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
+    field_values: npt.NDArray[np.float32], field_levels: FloatArray,
     obstacle_frames: FloatArray, clearance_mm: FloatArray, pair: IndexArray,
 ) -> None:  # fmt: skip
     frames, placed = np.empty((7, 3, 4)), np.empty((len(bodies), PLACED))
@@ -335,6 +334,6 @@ def _clearance_of_each(
         link_frames(arm, joints[i], frames)
         place_bodies(bodies, frames, beam_mm, 0, FLANGE_FRAME, placed)
         clearance_mm[i], pair[i] = nearest_pair(
-            pairs, bodies, obstacles, field_values, field_origin, field_spacing,
+            pairs, bodies, obstacles, field_values, field_levels,
             placed, obstacle_frames, i, 0, len(pairs), np.inf,
         )  # fmt: skip

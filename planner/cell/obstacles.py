@@ -61,8 +61,8 @@ def sphere(name: str, radius_mm: float, pose: FloatArray, *, turning: bool) -> O
 def bounding_box(obstacle: Obstacle) -> tuple[FloatArray, FloatArray]:
     """Return the least and the greatest x y z `(3,)` in mm of an obstacle in its own frame."""
     if obstacle.field is not None:
-        values, origin, spacing_mm = obstacle.field
-        return origin, origin + spacing_mm * (np.array(values.shape) - 1)
+        values, origin = obstacle.field.finest()
+        return origin, origin + obstacle.field.spacing_mm * (np.array(values.shape) - 1)
     a, b, c = obstacle.size_mm
     half = {BOX: (a, b, c), CYLINDER: (a, a, b), CAPSULE: (a, a, a + b)}[obstacle.kind]
     return -np.array(half), np.array(half)

@@ -22,6 +22,7 @@ from planner.errors import PlannerError, ScanFileError, WorkpieceError
 from planner.geometry.mesh import MILLIMETRES, load_mesh, radius_about_axis_mm, size_fault
 from planner.kinematics.arm import Arm
 from planner.kinematics.value import ValueFunction
+from planner.progress import Progress
 from planner.table.cost import Weights, costs_overflow, default_weights
 from planner.table.motion import Limits
 from planner.toml_table import TomlTable
@@ -66,12 +67,13 @@ def shipped_scans() -> list[str]:
     return sorted(file.stem for file in _SHIPPED.glob("*.toml"))
 
 
-def load_scan(scan: str | Path, say: Callable[[str], None] | None = None) -> Scan:
+def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progress: Progress | None = None) -> Scan:
     """Return the scan of a TOML file, or a shipped one by its name.
 
     Args:
         scan: The file, or the name.
         say: Called with one line when harmless flaws of the workpiece's mesh were mended.
+        progress: See `load_mesh`.
 
     Raises:
         PlannerError: A file cannot be read, or holds a key, value or shape that is not allowed; the message names it.
@@ -83,7 +85,7 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None) -> Sca
     top = TomlTable.load(file)
     with _named(file):
         cell, bodies = _read_cell(top.table("cell"), file.parent)
-        workpiece, mesh, mesh_file = _read_workpiece(top.table("workpiece"), file.parent, say)
+        workpiece, mesh, mesh_file = _read_workpiece(top.table("workpiece"), file.parent, say, progress)
         _check_it_fits_the_table(mesh, cell)
         path = _read_path(top.table("path"), file.parent, cell.probe, workpiece)
         value = ValueFunction.read(top.table("value"))
@@ -95,13 +97,19 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None) -> Sca
     return Scan(file.stem, cell, bodies, workpiece, mesh, mesh_file, path, value, limits, weights)
 
 
-def with_mesh(scan: Scan, file: Path, unit: str | None = None, say: Callable[[str], None] | None = None) -> Scan:
+def with_mesh(
+    scan: Scan,
+    file: Path,
+    unit: str | None = None,
+    say: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
+) -> Scan:
     """Return the scan with the workpiece of another file in the place of its own; see `load_mesh`.
 
     Raises:
         WorkpieceError: The mesh cannot be a workpiece, or does not fit the table.
     """
-    mesh = load_mesh(file, unit, say)
+    mesh = load_mesh(file, unit, say, progress)
     with _named(file):
         _check_it_fits_the_table(mesh, scan.cell)
     return replace(scan, workpiece=None, mesh=mesh, mesh_file=file)
@@ -181,14 +189,14 @@ def _read_probe(section: TomlTable) -> Probe:
 
 
 def _read_workpiece(
-    section: TomlTable, folder: Path, say: Callable[[str], None] | None
+    section: TomlTable, folder: Path, say: Callable[[str], None] | None, progress: Progress | None
 ) -> tuple[Workpiece | None, trimesh.Trimesh, Path | None]:
     if "mesh" in section:
         mesh_file = folder / section.text("mesh")
         kind = section.choice("class", (*CLASSES, "other"), "other")
         unit = section.choice("unit", tuple(MILLIMETRES)) if "unit" in section else None
         section.finish()
-        mesh = load_mesh(mesh_file, unit, say)
+        mesh = load_mesh(mesh_file, unit, say, progress)
         return (CLASSES[kind].measured(mesh) if kind != "other" else None), mesh, mesh_file
     shape = CLASSES[section.choice("class", tuple(CLASSES))]
     names = [item.name for item in fields(shape) if item.name != "middle_mm"]

@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     configurations = (
         list(Configuration) if arguments.configuration == "all" else [Configuration.parse(arguments.configuration)]
     )
-    scan = load_scan(arguments.scan, options.say)
+    scan = load_scan(arguments.scan, options.say, progress_line("mesh", sys.stderr))
     problem = map_problem(scan, progress_line("distance field", sys.stderr))
     maps = build_maps(problem, configurations, arguments.angles, progress_line("map", sys.stderr))
     drawn = most_reachable(maps)

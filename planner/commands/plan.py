@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     set_aside(arguments.out, PLAN_RESULTS)
     best = arguments.configuration == "best"
     asked = list(Configuration) if best else [Configuration.parse(arguments.configuration)]
-    scan = load_scan(arguments.scan, options.say)
+    scan = load_scan(arguments.scan, options.say, progress_line("mesh", sys.stderr))
     problem = map_problem(scan, progress_line("distance field", sys.stderr))
     maps = build_maps(problem, asked, arguments.angles, progress_line("map", sys.stderr))
     problems = {configuration.label: problem_of(scan, each, arguments.start) for configuration, each in maps.items()}

@@ -62,9 +62,10 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 def run(arguments: argparse.Namespace) -> int:
     """Scan, write cloud, figures and report, print what it came to, and return the exit status."""
     set_aside(arguments.out, SCAN_RESULTS, keep=() if arguments.mesh is None else (arguments.mesh,))
-    scan = load_scan(arguments.scan, options.say)
+    progress = progress_line("mesh", sys.stderr)
+    scan = load_scan(arguments.scan, options.say, progress)
     if arguments.mesh is not None:
-        scan = with_mesh(scan, arguments.mesh, arguments.unit, options.say)
+        scan = with_mesh(scan, arguments.mesh, arguments.unit, options.say, progress)
     asked = ScanOptions(
         port=options.fresh_table(arguments.port, decimals=arguments.decimals, seed=arguments.seed),
         baud=arguments.baud,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.geometry.capsule import clamp_unit
 from planner.kernel import kernel
 
@@ -25,10 +25,12 @@ class BoundingVolumeHierarchy(NamedTuple):
     Attributes:
         triangles: `(n_leaves * m, 3, 3)`, the corners, leaf by leaf; some triangles are there twice to fill it up.
         boxes: `(2 n_leaves, 6)`, the least and the greatest x y z of each node; the first row is unused.
+        members: `(n_leaves * m,)`, which of the given triangles each of them is.
     """
 
     triangles: FloatArray
     boxes: FloatArray
+    members: IndexArray
 
 
 def bounding_volume_hierarchy(triangles: FloatArray) -> BoundingVolumeHierarchy:
@@ -51,7 +53,7 @@ def bounding_volume_hierarchy(triangles: FloatArray) -> BoundingVolumeHierarchy:
         children = boxes[2 * first : 4 * first].reshape(first, 2, 6)
         boxes[first : 2 * first] = np.hstack((children[:, :, :3].min(axis=1), children[:, :, 3:].max(axis=1)))
         first //= 2
-    return BoundingVolumeHierarchy(leaves.reshape(-1, 3, 3), boxes)
+    return BoundingVolumeHierarchy(leaves.reshape(-1, 3, 3), boxes, order.reshape(-1))
 
 
 @kernel

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.arrays import FloatArray
-from planner.geometry.signed_distance_field import LOOK_UP_ERROR, look_up
+from planner.geometry.signed_distance_field import look_up
 from planner.geometry.solid import point_distance
 from planner.kernel import kernel
 
@@ -29,14 +29,14 @@ _SHARE, _BOUND, _COLUMNS = 3, 6, 7
 @kernel
 def _bounds(
     kind: int, size_0: float, size_1: float, size_2: float,
-    values: NDArray[np.float32], origin: FloatArray, spacing: float,
+    values: NDArray[np.float32], levels: FloatArray,
     x: float, y: float, z: float,
     ux: float, uy: float, uz: float, vx: float, vy: float, vz: float, wx: float, wy: float, wz: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Return a lower and an upper bound of the least distance of the box with the half axes u, v and w."""
     if kind == FIELD:
         reach2 = ux * ux + uy * uy + uz * uz + vx * vx + vy * vy + vz * vz + wx * wx + wy * wy + wz * wz
-        distance = look_up(values, origin, spacing, x, y, z) - LOOK_UP_ERROR * spacing
+        distance = look_up(values, levels, x, y, z)
         return distance - sqrt(reach2), distance
     # The distance to a convex solid is a convex function, so its tangent plane bounds it, at one of the box's corners.
     distance, nx, ny, nz = point_distance(kind, size_0, size_1, size_2, x, y, z)
@@ -50,7 +50,7 @@ def _bounds(
 @kernel
 def box_distance_bound(
     kind: int, size_0: float, size_1: float, size_2: float,
-    values: NDArray[np.float32], origin: FloatArray, spacing: float,
+    values: NDArray[np.float32], levels: FloatArray,
     x: float, y: float, z: float,
     ux: float, uy: float, uz: float, vx: float, vy: float, vz: float, wx: float, wy: float, wz: float,
     enough_mm: float,
@@ -66,8 +66,7 @@ def box_distance_bound(
         size_1: See there.
         size_2: See there.
         values: The field, for that kind.
-        origin: Its origin.
-        spacing: Its spacing.
+        levels: The field's grids.
         x: The middle of the box in the shape's frame.
         y: See there.
         z: See there.
@@ -82,9 +81,7 @@ def box_distance_bound(
         wz: See there.
         enough_mm: The distance from which on it is of no interest.
     """
-    lower, least = _bounds(
-        kind, size_0, size_1, size_2, values, origin, spacing, x, y, z, ux, uy, uz, vx, vy, vz, wx, wy, wz
-    )
+    lower, least = _bounds(kind, size_0, size_1, size_2, values, levels, x, y, z, ux, uy, uz, vx, vy, vz, wx, wy, wz)
     if lower >= enough_mm:
         return enough_mm
     u, v, w = sqrt(ux * ux + uy * uy + uz * uz), sqrt(vx * vx + vy * vy + vz * vz), sqrt(wx * wx + wy * wy + wz * wz)
@@ -113,7 +110,7 @@ def box_distance_bound(
         for side in (-1.0, 1.0):
             px, py, pz = x + side * dx, y + side * dy, z + side * dz
             lower, upper = _bounds(
-                kind, size_0, size_1, size_2, values, origin, spacing, px, py, pz,
+                kind, size_0, size_1, size_2, values, levels, px, py, pz,
                 a * ux, a * uy, a * uz, b * vx, b * vy, b * vz, c * wx, c * wy, c * wz,
             )  # fmt: skip
             least, lower = min(least, upper), max(lower, bound)  # no part of a box is nearer than the whole

@@ -1,61 +1,165 @@
 """Where a surface crosses itself. Bodies that touch do not cross, and files round their corners."""
 
+from math import sqrt
+
 import numpy as np
 import trimesh
 
 from planner.arrays import FloatArray, IndexArray
+from planner.geometry.bounding_volume_hierarchy import bounding_volume_hierarchy
 from planner.geometry.components import connected
 from planner.geometry.edges import edges_of
 from planner.geometry.winding_number import solid_angles
+from planner.kernel import kernel
+from planner.progress import Progress
 
 _TOUCHING = 1e-6
 """How deep, in longest sides of the mesh, bodies may reach into each other and still only touch."""
 _ASKED_TRIANGLES = 64
+_BLOCK_TRIANGLES = 16_384
+_DEEPEST = 64
+"""Levels that the walk's list of open nodes has room for: far more triangles than memory."""
 
 
-def first_crossing(mesh: trimesh.Trimesh) -> FloatArray | None:
-    """Return a point `(3,)` where an edge pierces a triangle that it has no corner in common with, or None."""
-    triangles = np.asarray(mesh.triangles)
-    near, counts = mesh.triangles_tree.intersection_v(triangles.min(axis=1), triangles.max(axis=1))
-    pairs = np.column_stack((np.repeat(np.arange(len(triangles)), counts.astype(np.int64)), near))
-    shared = (mesh.faces[pairs[:, 0], :, np.newaxis] == mesh.faces[pairs[:, 1], np.newaxis, :]).any(axis=(1, 2))
-    pairs = pairs[~shared]
+def first_crossing(mesh: trimesh.Trimesh, progress: Progress | None = None) -> FloatArray | None:
+    """Return a point `(3,)` where an edge pierces a triangle that it has no corner in common with, or None.
+
+    Args:
+        mesh: The mesh.
+        progress: Called with the triangles done and all of them, between blocks.
+    """
+    triangles, faces = np.array(mesh.triangles, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
+    hierarchy = bounding_volume_hierarchy(triangles)
     depth = _TOUCHING * float(np.max(mesh.extents))
-    at_rims = []
-    for corner in range(3):
-        start = triangles[pairs[:, 0], corner]
-        end = triangles[pairs[:, 0], (corner + 1) % 3]
-        points, depths = _piercings(start, end, triangles[pairs[:, 1]], depth)
-        pierced = np.flatnonzero(depths > depth)
-        if len(pierced):
-            return np.asarray(points[pierced[0]])
-        at_rims.append(pairs[depths > -depth])
+    at_rims, place, room = [], np.empty(3), 1024
+    for first in range(0, len(faces), _BLOCK_TRIANGLES):
+        last = min(first + _BLOCK_TRIANGLES, len(faces))
+        while True:
+            pairs = np.empty((room, 2), dtype=np.int64)
+            count = _pierced(triangles, faces, hierarchy.boxes, hierarchy.members, first, last, depth, pairs, place)
+            if count <= room:
+                break
+            room = count
+        if count < 0:
+            last = len(faces)
+        if progress is not None:
+            progress(last, len(faces))
+        if count < 0:
+            return place
+        at_rims.append(pairs[:count])
     return _first_overlap(mesh, np.concatenate(at_rims), depth)
 
 
-def _piercings(
-    start: FloatArray, end: FloatArray, triangles: FloatArray, depth: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return where each segment passes through its triangle's plane, and how far inside the triangle that is.
+@kernel
+def _pierced(
+    triangles: FloatArray, faces: IndexArray, boxes: FloatArray, members: IndexArray,
+    first: int, last: int, depth: float, pairs: IndexArray, place: FloatArray,
+) -> int:  # fmt: skip
+    """Find the triangles that are pierced by an edge of the triangles `first` to `last`.
 
-    The second is negative outside the triangle, and -inf where the segment does not reach from `depth` before the
-    plane to `depth` behind it.
+    Where one is pierced by more than `depth` inside it, the point is written to `place`. Where all are pierced at their
+    rims only, the piercing and the pierced triangle are written to `pairs`, as far as there is room.
+
+    Returns:
+        The number of such pairs, or -1 where `place` is written.
     """
-    corners = [triangles[:, corner] for corner in range(3)]
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    length = np.linalg.norm(normal, axis=1)
-    has_area = length > 0.0
-    normal /= np.where(has_area, length, 1.0)[:, np.newaxis]
-    before, behind = (np.sum((point - corners[0]) * normal, axis=1) for point in (start, end))
-    through = has_area & (before * behind < 0.0) & (np.minimum(np.abs(before), np.abs(behind)) > depth)
-    t = before / np.where(through, before - behind, 1.0)
-    points = start + t[:, np.newaxis] * (end - start)
-    inside = np.full(len(start), np.inf)
-    for here, there in zip(corners, (*corners[1:], corners[0]), strict=True):
-        along = there - here
-        across = np.cross(normal, along) / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, np.newaxis]
-        inside = np.minimum(inside, np.sum((points - here) * across, axis=1))
-    return points, np.where(through, inside, -np.inf)
+    n_leaves = len(boxes) // 2
+    per_leaf = len(members) // n_leaves
+    opened = np.empty(_DEEPEST, dtype=np.int64)
+    count = 0
+    for a in range(first, last):
+        opened[0], n_open = 1, 1
+        while n_open > 0:
+            n_open -= 1
+            node = opened[n_open]
+            if not _meets(triangles, a, boxes, node):
+                continue
+            if node < n_leaves:
+                opened[n_open], opened[n_open + 1] = 2 * node, 2 * node + 1
+                n_open += 2
+                continue
+            for at in range((node - n_leaves) * per_leaf, (node - n_leaves + 1) * per_leaf):
+                inside = _depth_of_piercing(triangles, faces, a, members[at], depth, place)
+                if inside > depth:
+                    return -1
+                if inside > -depth:
+                    if count < len(pairs):
+                        pairs[count, 0], pairs[count, 1] = a, members[at]
+                    count += 1
+    return count
+
+
+@kernel
+def _meets(triangles: FloatArray, a: int, boxes: FloatArray, node: int) -> bool:
+    """Return whether the box of a triangle meets that of a node."""
+    for axis in range(3):
+        p, q, r = triangles[a, 0, axis], triangles[a, 1, axis], triangles[a, 2, axis]
+        if max(p, q, r) < boxes[node, axis] or min(p, q, r) > boxes[node, 3 + axis]:
+            return False
+    return True
+
+
+@kernel
+def _has_common_corner(faces: IndexArray, a: int, b: int) -> bool:
+    for i in range(3):
+        for j in range(3):
+            if faces[a, i] == faces[b, j]:
+                return True
+    return False
+
+
+@kernel
+def _depth_of_piercing(
+    triangles: FloatArray, faces: IndexArray, a: int, b: int, depth: float, place: FloatArray
+) -> float:
+    """Return how far inside triangle b the edges of triangle a pierce it, -inf if they have a corner in common.
+
+    It is the greatest of the three, or the first that is above `depth`; then `place` is where.
+    """
+    deepest = -np.inf
+    if _has_common_corner(faces, a, b):
+        return deepest
+    for corner in range(3):
+        deepest = max(deepest, _piercing(triangles, a, corner, b, depth, place))
+        if deepest > depth:
+            break
+    return deepest
+
+
+@kernel
+def _piercing(triangles: FloatArray, a: int, corner: int, b: int, depth: float, place: FloatArray) -> float:
+    """Return how far inside triangle b an edge of triangle a passes through its plane, and write where to `place`.
+
+    It is negative outside the triangle, and -inf where the edge does not reach from `depth` before the plane to
+    `depth` behind it.
+    """
+    ax, ay, az = triangles[b, 0, 0], triangles[b, 0, 1], triangles[b, 0, 2]
+    ux, uy, uz = triangles[b, 1, 0] - ax, triangles[b, 1, 1] - ay, triangles[b, 1, 2] - az
+    vx, vy, vz = triangles[b, 2, 0] - ax, triangles[b, 2, 1] - ay, triangles[b, 2, 2] - az
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    length = sqrt(nx * nx + ny * ny + nz * nz)
+    if length == 0.0:
+        return -np.inf
+    nx, ny, nz = nx / length, ny / length, nz / length
+    to = (corner + 1) % 3
+    px, py, pz = triangles[a, corner, 0], triangles[a, corner, 1], triangles[a, corner, 2]
+    qx, qy, qz = triangles[a, to, 0], triangles[a, to, 1], triangles[a, to, 2]
+    before = (px - ax) * nx + (py - ay) * ny + (pz - az) * nz
+    behind = (qx - ax) * nx + (qy - ay) * ny + (qz - az) * nz
+    if before * behind >= 0.0 or min(abs(before), abs(behind)) <= depth:
+        return -np.inf
+    t = before / (before - behind)
+    x, y, z = px + t * (qx - px), py + t * (qy - py), pz + t * (qz - pz)
+    inside = np.inf
+    for here in range(3):
+        there = (here + 1) % 3
+        hx, hy, hz = triangles[b, here, 0], triangles[b, here, 1], triangles[b, here, 2]
+        ex, ey, ez = triangles[b, there, 0] - hx, triangles[b, there, 1] - hy, triangles[b, there, 2] - hz
+        cx, cy, cz = ny * ez - nz * ey, nz * ex - nx * ez, nx * ey - ny * ex
+        along = max(sqrt(ex * ex + ey * ey + ez * ez), 1e-300)
+        inside = min(inside, ((x - hx) * cx + (y - hy) * cy + (z - hz) * cz) / along)
+    place[0], place[1], place[2] = x, y, z
+    return inside
 
 
 def _first_overlap(mesh: trimesh.Trimesh, pairs: IndexArray, depth: float) -> FloatArray | None:

@@ -11,6 +11,7 @@ from planner.errors import WorkpieceError
 from planner.geometry.closed_surface import closed_surface
 from planner.geometry.crossing import first_crossing
 from planner.geometry.mesh_file import read_mesh_file
+from planner.progress import Progress
 
 # A part that a probe with a 60 mm line and an arm of 650 mm reach can be meant for.
 SMALLEST_MM = 10.0
@@ -27,7 +28,12 @@ def radius_about_axis_mm(mesh: trimesh.Trimesh, T_TW: FloatArray) -> float:
     return float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
 
 
-def load_mesh(file: Path, unit: str | None = None, say: Callable[[str], None] | None = None) -> trimesh.Trimesh:
+def load_mesh(
+    file: Path,
+    unit: str | None = None,
+    say: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
+) -> trimesh.Trimesh:
     """Return the mesh of an STL, PLY or OBJ file, in mm, when it is sound.
 
     Args:
@@ -35,13 +41,14 @@ def load_mesh(file: Path, unit: str | None = None, say: Callable[[str], None] | 
         unit: Of its lengths, one of `MILLIMETRES`; without one they are taken for mm, and a size that tells of another
             unit is asked about.
         say: Called with one line when harmless flaws were mended.
+        progress: Called with the triangles done and all of them while the surface is checked for crossings.
 
     Raises:
         WorkpieceError: It cannot be read, is empty, open or crosses itself, or its size cannot be meant.
     """
     content = read_mesh_file(file)
     try:
-        mesh, mended = sound_mesh(content.vertices * MILLIMETRES[unit or "mm"], content.faces, unit)
+        mesh, mended = sound_mesh(content.vertices * MILLIMETRES[unit or "mm"], content.faces, unit, progress)
     except WorkpieceError as error:
         raise WorkpieceError(f"{file}: {error}") from error
     notes = (*content.notes, *mended)
@@ -51,7 +58,7 @@ def load_mesh(file: Path, unit: str | None = None, say: Callable[[str], None] | 
 
 
 def sound_mesh(
-    vertices: FloatArray, faces: IndexArray, unit: str | None = None
+    vertices: FloatArray, faces: IndexArray, unit: str | None = None, progress: Progress | None = None
 ) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
     """Return the mesh of triangles `(m, 3)` with corners `(n, 3)` in mm, and what was mended in it.
 
@@ -68,7 +75,7 @@ def sound_mesh(
         raise WorkpieceError(f"{fault} Then set unit in [workpiece], or --unit" if fault.endswith("?") else fault)
     surface = closed_surface(vertices, faces)
     mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
-    crossing = first_crossing(mesh)
+    crossing = first_crossing(mesh, progress)
     if crossing is not None:
         x, y, z = crossing
         raise WorkpieceError(f"the mesh crosses itself near x {x:.3f}, y {y:.3f}, z {z:.3f} mm")

@@ -1,13 +1,13 @@
-"""The signed distance of a mesh on a regular grid: positive outside, negative inside, in mm.
+"""The signed distance of a mesh on nested regular grids: positive outside, negative inside, in mm.
 
-The distance is that of the nearest triangle, exactly; the sign is the winding number's along each line of the grid. A
+The distance is that of the nearest triangle, exactly; the sign is the winding number's along each line of a grid. A
 field is built once and kept on disk under the mesh's content and the resolution; kernels look it up.
 """
 
 import hashlib
 import zipfile
 from contextlib import suppress
-from math import floor, hypot, sqrt
+from math import hypot, sqrt
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from planner.arrays import FloatArray
+from planner.arrays import FloatArray, IndexArray
 from planner.geometry.bounding_volume_hierarchy import bounding_volume_hierarchy, nearest_triangle
 from planner.geometry.shells import turned_outward
 from planner.geometry.winding_number import BESIDE, winding_numbers
@@ -24,34 +24,49 @@ from planner.progress import Progress
 from planner.whole_file import whole_file
 
 _MOST_POINTS = 4_000_000
-_RULES = b"signs by the nesting of shells"
+_RULES = b"nested grids, signs by the nesting of shells"
 """Part of a stored field's name, so that fields built by other rules are not read back."""
-LOOK_UP_ERROR = 0.5 * sqrt(3.0)
-"""What a look-up can be off, in grid spacings: half a cell's diagonal."""
+_COARSER = 3
+"""How many spacings of a level the next one has for its own."""
+_BESIDE_POINTS = 5
+"""Points that a level reaches beyond the one before, on each side."""
+_REACH_MM = 300.0
+"""How far the levels reach beyond the mesh: the radius of an arm's part, and a comfortable clearance."""
+_SPACING, _SHAPE = 3, 4
+"""Columns of the levels."""
 _STEP = 0.25
 """Shortest stride of the walk along a segment, in grid spacings."""
 
 
 class SignedDistanceField(NamedTuple):
-    """A grid of signed distances.
+    """Signed distances on nested grids: a fine one around the mesh, and coarser ones that reach farther.
 
     Attributes:
-        values_mm: `(nx, ny, nz)` float32, the signed distance at the grid's points.
-        origin_mm: `(3,)`, the grid's first point in the mesh's frame.
-        spacing_mm: The distance between neighbouring points.
+        values_mm: `(n,)` float32, the signed distances at the grids' points, grid after grid, z running fastest.
+        levels: `(n_levels, 7)`, of each grid the first point in the mesh's frame, the spacing, both in mm, and the
+            number of points along x, y and z; the finest grid comes first.
     """
 
     values_mm: NDArray[np.float32]
-    origin_mm: FloatArray
-    spacing_mm: float
+    levels: FloatArray
+
+    @property
+    def spacing_mm(self) -> float:
+        """The spacing of the finest grid."""
+        return float(self.levels[0, _SPACING])
+
+    def finest(self) -> tuple[NDArray[np.float32], FloatArray]:
+        """Return the finest grid's values `(nx, ny, nz)` and its first point `(3,)`."""
+        shape = self.levels[0, _SHAPE:].astype(int)
+        return self.values_mm[: np.prod(shape)].reshape(shape), self.levels[0, :_SPACING]
 
 
-NO_FIELD = SignedDistanceField(np.zeros((2, 2, 2), np.float32), np.zeros(3), 1.0)
+NO_FIELD = SignedDistanceField(np.zeros(8, np.float32), np.array([[0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 2.0]]))
 """What a kernel is handed where no part is a mesh."""
 
 
 def build_field(mesh: trimesh.Trimesh, spacing_mm: float, progress: Progress | None = None) -> SignedDistanceField:
-    """Return the signed distance field of a watertight mesh; the grid reaches a cell beyond it on each side.
+    """Return the signed distance field of a watertight mesh; the finest grid reaches a cell beyond it on each side.
 
     The values are exact to the rounding of float32, but for points outside within a thousandth of the spacing of the
     surface, which count as inside. So no value is above the true one. Which side of the surface is inside follows from
@@ -59,7 +74,7 @@ def build_field(mesh: trimesh.Trimesh, spacing_mm: float, progress: Progress | N
 
     Args:
         mesh: The mesh, in mm.
-        spacing_mm: The grid's spacing.
+        spacing_mm: The finest grid's spacing.
         progress: Called with the points done and all points, between blocks.
 
     Raises:
@@ -75,20 +90,39 @@ def build_field(mesh: trimesh.Trimesh, spacing_mm: float, progress: Progress | N
             f"a distance field of {shape[0]} x {shape[1]} x {shape[2]} points is too large, choose a spacing above "
             f"{spacing_mm:g} mm"
         )
-    origin = (lower + upper) / 2 - (shape - 1) * spacing_mm / 2
-    values = np.empty(tuple(shape), dtype=np.float32)
+    levels = _levels((lower + upper) / 2, shape, spacing_mm)
+    sizes = levels[:, _SHAPE:].prod(axis=1).astype(int)
+    values = np.empty(sizes.sum(), dtype=np.float32)
     triangles = np.array(mesh.triangles, dtype=np.float64)
     hierarchy = bounding_volume_hierarchy(triangles)
-    for i in range(shape[0]):
-        _write_distances(*hierarchy, origin, spacing_mm, i, values[i])
-        if progress is not None:
-            progress((i + 1) * values[0].size, values.size)
     turned = turned_outward(np.asarray(mesh.vertices), np.asarray(mesh.faces))
     triangles[turned] = triangles[turned, ::-1]
-    inside = winding_numbers(triangles, origin, spacing_mm, values.shape) > 0
-    inside |= values < hypot(*BESIDE) * spacing_mm
-    values[inside] *= -1.0
-    return SignedDistanceField(values, origin, spacing_mm)
+    done = 0
+    for level, of_level in zip(levels, np.split(values, np.cumsum(sizes)[:-1]), strict=True):
+        origin, spacing = level[:_SPACING], float(level[_SPACING])
+        grid = of_level.reshape(level[_SHAPE:].astype(int))
+        for i in range(len(grid)):
+            _write_distances(hierarchy.triangles, hierarchy.boxes, origin, spacing, i, grid[i])
+            done += grid[i].size
+            if progress is not None:
+                progress(done, values.size)
+        inside = winding_numbers(triangles, origin, spacing, grid.shape) > 0
+        inside |= grid < hypot(*BESIDE) * spacing
+        grid[inside] *= -1.0
+    return SignedDistanceField(values, levels)
+
+
+def _levels(middle: FloatArray, shape: IndexArray, spacing_mm: float) -> FloatArray:
+    """Return the levels of a field about `middle` `(3,)`, the finest one with `shape` `(3,)` points."""
+    levels = []
+    reach_mm = (shape - 1) * spacing_mm / 2 + _REACH_MM
+    while True:
+        half_mm = (shape - 1) * spacing_mm / 2
+        levels.append((*(middle - half_mm), spacing_mm, *shape))
+        if (half_mm >= reach_mm).all():
+            return np.array(levels, dtype=np.float64)
+        shape = -(-shape // _COARSER) + 2 * _BESIDE_POINTS
+        spacing_mm *= _COARSER
 
 
 @kernel
@@ -142,67 +176,87 @@ def _load(file: Path) -> SignedDistanceField | None:
     """Return the stored field, or None where there is none or a damaged one: it is then built anew."""
     try:
         with file.open("rb") as content, np.load(content) as stored:
-            return SignedDistanceField(stored["values_mm"], stored["origin_mm"], float(stored["spacing_mm"]))
+            return SignedDistanceField(stored["values_mm"], stored["levels"])
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
 
 
 @kernel
-def look_up(values: NDArray[np.float32], origin: FloatArray, spacing: float, x: float, y: float, z: float) -> float:
-    """Return the signed distance in mm at a point of the mesh's frame.
+def look_up(values: NDArray[np.float32], levels: FloatArray, x: float, y: float, z: float) -> float:
+    """Return a lower bound in mm of the signed distance at a point of the mesh's frame.
 
-    On the grid it is trilinear, so at most half a cell's diagonal off. Beyond it, it is a lower bound: the way to
-    the mesh is the longest side of a triangle with a blunt angle at the nearest grid point. It ends in the mesh box.
+    With the weights w of trilinear interpolation in the finest grid that holds the point, e2 is the weighted mean of
+    the squared distances from the cell's corners, at most 3/4 of a squared spacing. The interpolated distance d is at
+    most e off. Far from the mesh the bound is better: the squared distance from any set, less the squared length of the
+    point's vector, is concave, since it is a minimum of linear functions. So the true distance is at least
+    sqrt(d2 - e2). Beyond all grids, the way to the mesh is the longest side of a triangle with a blunt angle at the
+    nearest point of the coarsest grid's box.
+
+    Args:
+        values: See `SignedDistanceField`.
+        levels: The same.
+        x: The point.
+        y: The point.
+        z: The point.
     """
-    nx, ny, nz = values.shape
-    gx, gy, gz = (x - origin[0]) / spacing, (y - origin[1]) / spacing, (z - origin[2]) / spacing
+    first, last = 0, len(levels) - 1
+    for level in range(last + 1):
+        spacing = levels[level, _SPACING]
+        nx, ny, nz = int(levels[level, _SHAPE]), int(levels[level, _SHAPE + 1]), int(levels[level, _SHAPE + 2])
+        gx, gy, gz = (
+            (x - levels[level, 0]) / spacing,
+            (y - levels[level, 1]) / spacing,
+            (z - levels[level, 2]) / spacing,
+        )
+        if level == last or (0.0 <= gx <= nx - 1 and 0.0 <= gy <= ny - 1 and 0.0 <= gz <= nz - 1):
+            break
+        first += nx * ny * nz
     cx, cy, cz = min(max(gx, 0.0), nx - 1.0), min(max(gy, 0.0), ny - 1.0), min(max(gz, 0.0), nz - 1.0)
-    i, j, k = min(floor(cx), nx - 2), min(floor(cy), ny - 2), min(floor(cz), nz - 2)
+    i, j, k = min(int(cx), nx - 2), min(int(cy), ny - 2), min(int(cz), nz - 2)
     u, v, w = cx - i, cy - j, cz - k
-    near = (1 - u) * (1 - v) * values[i, j, k] + u * (1 - v) * values[i + 1, j, k]
-    near += (1 - u) * v * values[i, j + 1, k] + u * v * values[i + 1, j + 1, k]
-    far = (1 - u) * (1 - v) * values[i, j, k + 1] + u * (1 - v) * values[i + 1, j, k + 1]
-    far += (1 - u) * v * values[i, j + 1, k + 1] + u * v * values[i + 1, j + 1, k + 1]
-    inside = float((1 - w) * near + w * far)
+    a = first + (i * ny + j) * nz + k
+    b, c, d = a + ny * nz, a + nz, a + (ny + 1) * nz
+    near = (1 - v) * ((1 - u) * values[a] + u * values[b]) + v * ((1 - u) * values[c] + u * values[d])
+    a, b, c, d = a + 1, b + 1, c + 1, d + 1
+    far = (1 - v) * ((1 - u) * values[a] + u * values[b]) + v * ((1 - u) * values[c] + u * values[d])
+    distance = float((1 - w) * near + w * far)
+    off2 = spacing * spacing * (u * (1 - u) + v * (1 - v) + w * (1 - w))
+    far2 = distance * distance - off2
+    bound = sqrt(far2) if far2 > 0.0 and distance > 0.0 else distance - sqrt(off2)
     dx, dy, dz = (gx - cx) * spacing, (gy - cy) * spacing, (gz - cz) * spacing
-    outside = dx * dx + dy * dy + dz * dz
-    if outside == 0.0:
-        return inside
-    # The grid reaches a cell beyond the mesh on each side, so the box that it leaves within holds the mesh.
-    bx, by, bz = max(1.0 - gx, gx - nx + 2.0, 0.0), max(1.0 - gy, gy - ny + 2.0, 0.0), max(1.0 - gz, gz - nz + 2.0, 0.0)
-    return max(sqrt(outside + max(inside, 0.0) ** 2), spacing * sqrt(bx * bx + by * by + bz * bz))
+    outside2 = dx * dx + dy * dy + dz * dz
+    return bound if outside2 == 0.0 else sqrt(outside2 + max(bound, 0.0) ** 2)
 
 
 @kernel
 def field_distance(
-    values: NDArray[np.float32], origin: FloatArray, spacing: float,
+    values: NDArray[np.float32], levels: FloatArray,
     ax: float, ay: float, az: float, bx: float, by: float, bz: float, enough_mm: float,
 ) -> float:  # fmt: skip
     """Return a lower bound in mm of the least signed distance of the segment a-b from the mesh.
 
-    It is never above the true distance and, where the segment runs within the grid, at most two spacings below.
+    It is never above the true distance and, where the segment runs within the finest grid, at most two spacings below.
     Where the distance is `enough_mm` or more, the result is only known to be at least that. The walk goes from the
     middle towards each end and strides as far as the distance at hand allows: nothing nearer than the least one found
     can lie within the difference of the two, nor within that of the end.
     """
     ux, uy, uz = bx - ax, by - ay, bz - az
     length = sqrt(ux * ux + uy * uy + uz * uz)
-    half, shortest = 0.5 * length, _STEP * spacing
-    # Half a cell's diagonal from the look-up, half a shortest stride from the walk.
-    error = (LOOK_UP_ERROR + 0.5 * _STEP) * spacing
-    middle = look_up(values, origin, spacing, ax + 0.5 * ux, ay + 0.5 * uy, az + 0.5 * uz)
+    half, shortest = 0.5 * length, _STEP * levels[0, _SPACING]
+    error = 0.5 * shortest
+    middle = look_up(values, levels, ax + 0.5 * ux, ay + 0.5 * uy, az + 0.5 * uz)
     free = enough_mm + error
     least = min(free, middle)
     for end in (-0.5, 0.5):
         t = 0.5 + end
-        last = look_up(values, origin, spacing, ax + t * ux, ay + t * uy, az + t * uz)
+        last = look_up(values, levels, ax + t * ux, ay + t * uy, az + t * uz)
         least = min(least, last)
         along, value = 0.0, middle
         # The brackets matter: no less than `half` once `along` is, so that rounding cannot keep the walk from ending.
         while along + ((value - least) + (last - least)) < half:
             along = min(along + max(value - least, shortest), half)
             t = 0.5 + end * (along / half)
-            value = look_up(values, origin, spacing, ax + t * ux, ay + t * uy, az + t * uz)
+            value = look_up(values, levels, ax + t * ux, ay + t * uy, az + t * uz)
             least = min(least, value)
     # `free - error` need not be `enough_mm`: in floating point it may be less, and would block a free segment.
     return least - error if least < free else enough_mm

@@ -124,8 +124,7 @@ class _Cells(NamedTuple):
     bodies: FloatArray
     obstacles: FloatArray
     field_values: npt.NDArray[np.float32]
-    field_origin: FloatArray
-    field_spacing: float
+    field_levels: FloatArray
     obstacle_frames: FloatArray  # (n_angles, n_obstacles, 3, 4)
 
 
@@ -191,7 +190,7 @@ def _rates(factor: UserFactor, poses: RatedPoses) -> FloatArray:
 def _rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between would pass twenty of them on
     arm: FloatArray, table_poses: FloatArray, T_TF: FloatArray, value: FloatArray, ranges: FloatArray,
     slots: IndexArray, beam_mm: float, n_common: int, pairs: IndexArray, bodies: FloatArray,
-    obstacles: FloatArray, field_values: npt.NDArray[np.float32], field_origin: FloatArray, field_spacing: float,
+    obstacles: FloatArray, field_values: npt.NDArray[np.float32], field_levels: FloatArray,
     obstacle_frames: FloatArray, first: int,
     values: FloatArray, reasons: CodeArray, joints_seen: FloatArray, clearance_seen: FloatArray,
 ) -> None:  # fmt: skip
@@ -220,7 +219,7 @@ def _rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between 
                     if known_arm < 0:
                         place_bodies(bodies, frames, beam_mm, FLANGE_FRAME, FLANGE_FRAME, placed)
                         common_mm, common_pair = nearest_pair(
-                            pairs, bodies, obstacles, field_values, field_origin, field_spacing,
+                            pairs, bodies, obstacles, field_values, field_levels,
                             placed, obstacle_frames, angle, 0, n_common, comfortable_mm,
                         )  # fmt: skip
                     if known_arm != slot >> 1:
@@ -231,7 +230,7 @@ def _rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between 
                             link_frames(arm, joints[slot], arm_frames)
                             place_bodies(bodies, frames, beam_mm, 0, ARM_FRAMES - 1, placed)
                             clearance_mm, own_pair = nearest_pair(
-                                pairs, bodies, obstacles, field_values, field_origin, field_spacing,
+                                pairs, bodies, obstacles, field_values, field_levels,
                                 placed, obstacle_frames, angle, n_common, len(pairs), common_mm,
                             )  # fmt: skip
                             pair = own_pair if own_pair >= 0 else common_pair

@@ -22,7 +22,7 @@ def random_triangles(count: int, seed: int) -> Array:
 
 
 def nearest_of(hierarchy: BoundingVolumeHierarchy, p: Array, guess: int = 0) -> tuple[float, int]:
-    return nearest_triangle(*hierarchy, float(p[0]), float(p[1]), float(p[2]), guess)
+    return nearest_triangle(hierarchy.triangles, hierarchy.boxes, float(p[0]), float(p[1]), float(p[2]), guess)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 17, 1000])
@@ -59,7 +59,8 @@ def test_a_triangle_is_as_far_as_its_nearest_point_even_where_it_is_a_line_or_a_
 
 def test_every_triangle_is_in_the_tree_and_every_box_holds_what_is_below_it() -> None:
     triangles = random_triangles(100, 0)
-    ours, boxes = bounding_volume_hierarchy(triangles)
+    ours, boxes, members = bounding_volume_hierarchy(triangles)
+    assert np.array_equal(ours, triangles[members])
     assert {t.tobytes() for t in ours} == {t.tobytes() for t in triangles}
     n_leaves = len(boxes) // 2
     leaves = ours.reshape(n_leaves, -1, 3)
