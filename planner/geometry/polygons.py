@@ -36,7 +36,10 @@ def _as_they_are(_vertices: FloatArray, triangles: IndexArray) -> IndexArray:
 def _quads_split(vertices: FloatArray, quads: IndexArray) -> IndexArray:
     """Return `(n, 2, 3)`: each quad along its first diagonal, or along the second where only that one is inside."""
     a, b, c, d = (vertices[quads[:, corner]] for corner in range(4))
-    along_first = np.sum(np.cross(b - a, c - a) * np.cross(c - a, d - a), axis=1) >= 0.0
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # coordinates that cannot be meant are refused by the mesh's size
+        along_first = np.sum(np.cross(b - a, c - a) * np.cross(c - a, d - a), axis=1) >= 0.0
     first, second = quads[:, [[0, 1, 2], [0, 2, 3]]], quads[:, [[0, 1, 3], [1, 2, 3]]]
     return np.where(along_first[:, np.newaxis, np.newaxis], first, second)
 

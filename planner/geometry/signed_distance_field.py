@@ -24,7 +24,7 @@ from planner.progress import Progress
 from planner.whole_file import whole_file
 
 _MOST_POINTS = 4_000_000
-_RULES = b"nested grids, signs by the nesting of shells"
+_RULES = b"nested grids, any winding, signs by the nesting of shells"
 """Part of a stored field's name, so that fields built by other rules are not read back."""
 _COARSER = 3
 """How many spacings of a level the next one has for its own."""
@@ -106,7 +106,8 @@ def build_field(mesh: trimesh.Trimesh, spacing_mm: float, progress: Progress | N
             done += grid[i].size
             if progress is not None:
                 progress(done, values.size)
-        inside = winding_numbers(triangles, origin, spacing, grid.shape) > 0
+        # Below 0 it is in a body that shares a wall with another one and is inside out against that one.
+        inside = winding_numbers(triangles, origin, spacing, grid.shape) != 0
         inside |= grid < hypot(*BESIDE) * spacing
         grid[inside] *= -1.0
     return SignedDistanceField(values, levels)
