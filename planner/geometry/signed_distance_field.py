@@ -224,9 +224,25 @@ def look_up(values: NDArray[np.float32], levels: FloatArray, x: float, y: float,
     off2 = spacing * spacing * (u * (1 - u) + v * (1 - v) + w * (1 - w))
     far2 = distance * distance - off2
     bound = sqrt(far2) if far2 > 0.0 and distance > 0.0 else distance - sqrt(off2)
+    if level == 0 and last > 0:
+        return bound
     dx, dy, dz = (gx - cx) * spacing, (gy - cy) * spacing, (gz - cz) * spacing
-    outside2 = dx * dx + dy * dy + dz * dz
-    return bound if outside2 == 0.0 else sqrt(outside2 + max(bound, 0.0) ** 2)
+    beyond2 = dx * dx + dy * dy + dz * dz
+    if beyond2 > 0.0:
+        bound = sqrt(beyond2 + max(bound, 0.0) ** 2)
+    # The finest grid reaches a cell beyond the mesh, so the box that it leaves within holds the mesh.
+    outside2 = _outside2(levels, x, y, z)
+    return max(bound, sqrt(outside2)) if outside2 > 0.0 else bound
+
+
+@kernel
+def _outside2(levels: FloatArray, x: float, y: float, z: float) -> float:
+    """Return the squared distance in mm2 of a point from the finest grid's box without its outermost cells."""
+    inner = levels[0, _SPACING]
+    dx = max(levels[0, 0] + inner - x, x - levels[0, 0] - (levels[0, _SHAPE] - 2.0) * inner, 0.0)
+    dy = max(levels[0, 1] + inner - y, y - levels[0, 1] - (levels[0, _SHAPE + 1] - 2.0) * inner, 0.0)
+    dz = max(levels[0, 2] + inner - z, z - levels[0, 2] - (levels[0, _SHAPE + 2] - 2.0) * inner, 0.0)
+    return float(dx * dx + dy * dy + dz * dz)
 
 
 @kernel
