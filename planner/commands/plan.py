@@ -82,7 +82,8 @@ def run(arguments: argparse.Namespace) -> int:
     maps = build_maps(problem, asked, arguments.angles, progress_line("map", sys.stderr))
     problems = {configuration.label: problem_of(scan, each, arguments.start) for configuration, each in maps.items()}
     planner = PLANNERS[arguments.planner]
-    comparison = best_configuration(problems, timed(smoothed(planner) if arguments.smooth else planner))
+    chosen_planner = timed(smoothed(planner) if arguments.smooth else planner)
+    comparison = best_configuration(problems, chosen_planner, progress_line("plan", sys.stderr))
     for label, outcome in comparison.outcomes.items():
         sys.stderr.write(configuration_line(label, outcome))
     if comparison.best is None:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from planner.planning.arm_motion import arm_follows
 from planner.planning.plan import NoPlan, Outcome, Plan, Planner
 from planner.planning.problem import Problem
+from planner.progress import Progress
 
 
 class Comparison(NamedTuple):
@@ -28,7 +29,9 @@ class Comparison(NamedTuple):
         return f"{name} gets farthest: {farthest.reason}"
 
 
-def best_configuration(problems: Mapping[str, Problem], planner: Planner) -> Comparison:
+def best_configuration(
+    problems: Mapping[str, Problem], planner: Planner, progress: Progress | None = None
+) -> Comparison:
     """Plan for each arm configuration and compare.
 
     Costs of different configurations compare only under equal weights, limits and start; that is up to the caller.
@@ -36,8 +39,15 @@ def best_configuration(problems: Mapping[str, Problem], planner: Planner) -> Com
     Args:
         problems: one problem per configuration, each with its own map.
         planner: the planner to compare by.
+        progress: called with the configurations done and all of them, before and after each.
     """
-    outcomes = {name: planner(problem) for name, problem in problems.items()}
+    outcomes: dict[str, Outcome] = {}
+    for name, problem in problems.items():
+        if progress is not None:
+            progress(len(outcomes), len(problems))
+        outcomes[name] = planner(problem)
+    if progress is not None:
+        progress(len(problems), len(problems))
     ranks = {
         name: (not arm_follows(problems[name], outcome), outcome.cost.total)
         for name, outcome in outcomes.items()

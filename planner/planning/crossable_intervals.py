@@ -27,6 +27,9 @@ ROUNDING = 1e-9
 MOST_INTERVALS = 2_000_000
 MOST_SPEEDS = 1_000
 
+# Pairs of an interval and a run, about a second.
+MOST_WORK = 100_000_000
+
 
 class Crossable(NamedTuple):
     """The crossable angles per column and speed.
@@ -116,8 +119,13 @@ def crossable_intervals(terms: Terms, speeds_deg_s: FloatArray) -> Crossable:
     first, count = np.zeros((steps + 1, speeds), dtype=np.int64), np.zeros((steps + 1, speeds), dtype=np.int64)
     lows, highs, end = np.zeros(1024), np.full(1024, turn), 1
     count[steps] = 1
+    work, gain = 0, terms.acceleration_limit_deg_s2 * terms.step_s * (1.0 + ROUNDING)
     for k in range(steps - 1, -1, -1):
         run_lows, run_highs = runs_of(terms.runs, k)
+        for s in range(speeds):
+            work += (count[k + 1] * (np.abs(speeds_deg_s - speeds_deg_s[s]) <= gain)).sum() * (len(run_lows) + 1)
+        if work > MOST_WORK:
+            break
         for s in range(speeds):
             piece_lows, piece_highs = _leave(
                 terms, speeds_deg_s, s, first[k + 1], count[k + 1], lows, highs, run_lows, run_highs

@@ -22,6 +22,9 @@ from planner.planning.verification import ROUNDING
 LIMIT_MARGIN = 1e-7
 SAMPLE_MARGIN = 1e-6
 
+# Pairs of an interval and a run, about a second: a proof that takes more is given up.
+MOST_WORK = 100_000_000
+
 # How many times smaller cells name the location, once there is a proof.
 FINER = 4
 
@@ -67,9 +70,11 @@ def first_unreachable_location(problem: Problem, cell_count: int) -> int | None:
         problem: what is to be crossed; a free start means all angles, or all speeds.
         cell_count: cells of speed for the proof; the location is named with smaller ones.
     """
-    if _first_empty_column(problem, cell_count) is None:
+    location = _first_empty_column(problem, cell_count)
+    if location is None:
         return None
-    return _first_empty_column(problem, FINER * cell_count)
+    finer = _first_empty_column(problem, FINER * cell_count)
+    return location if finer is None else finer
 
 
 def _first_empty_column(problem: Problem, cell_count: int) -> int | None:
@@ -92,9 +97,15 @@ def _first_empty_column(problem: Problem, cell_count: int) -> int | None:
 
 @kernel
 def _first_empty(terms: Terms, edges: FloatArray, start: Reachable) -> int:
-    """Return the first column in which nothing can be reached; -1 where something can in all."""
-    reachable = start
+    """Return the first column in which nothing can be reached; -1 where something can in all, or is unknown."""
+    reachable, work = start, 0.0
+    cells_in_a_step = 2.0 * terms.acceleration_limit_deg_s2 * terms.step_s / (edges[1] - edges[0]) + 3.0
+    cells_in_a_step = min(cells_in_a_step, float(len(edges) - 1))
     for k in range(len(terms.values) - 1):
+        run_count = 1 + np.count_nonzero((terms.runs[k] > 0) & (np.roll(terms.runs[k], 1) == 0))
+        work += reachable.interval_count.sum() * cells_in_a_step * run_count
+        if work > MOST_WORK:
+            return -1
         reachable = _step(terms, edges, k, reachable)
         if reachable.interval_count.max() == 0:
             return k + 1

@@ -164,7 +164,7 @@ def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: Progre
         each.label: Problem(map_, scan.path.step_s, scan.limits, scan.weights, arm=arm_on_path(scan, each))
         for each, map_ in maps.items()
     }
-    comparison = best_configuration(problems, PLANNERS[DEFAULT_PLANNER])
+    comparison = best_configuration(problems, PLANNERS[DEFAULT_PLANNER], progress("plan"))
     if comparison.best is None:
         raise ScanError(f"{scan.name}: there is no plan; {unit_hint(scan) or comparison.refusal}")
     plan, on_path = comparison.outcomes[comparison.best], problems[comparison.best].arm

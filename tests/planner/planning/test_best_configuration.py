@@ -24,6 +24,13 @@ def test_the_configuration_of_the_cheapest_plan_wins_and_none_is_left_out() -> N
     assert isinstance(comparison.outcomes["flip"], NoPlan)
 
 
+def test_progress_is_told_before_and_after_each_configuration() -> None:
+    told: list[tuple[int, int]] = []
+    problems = {name: problem_of(0.5, name) for name in "ab"}
+    best_configuration(problems, dynamic_programming, lambda done, total: told.append((done, total)))
+    assert told == [(0, 2), (1, 2), (2, 2)]
+
+
 def test_where_no_configuration_can_cross_none_is_best() -> None:
     asked = {"a": problem_of(0.0, "a"), "b": problem_of(0.0, "b")}
     assert best_configuration(asked, dynamic_programming).best is None

@@ -70,6 +70,14 @@ def test_a_map_without_obstacles_is_crossable_from_everywhere() -> None:
     assert np.all(crossable.highs - crossable.lows == 12.0)
 
 
+def test_intervals_that_take_too_much_work_are_given_up() -> None:
+    values = 0.1 + 0.9 * np.random.default_rng(1).random((20, 360))
+    values[values < 0.2] = 0.0
+    problem = Problem(ConfigurationMap(values), 0.25)
+    assert crossing_motion(problem, 4) is not None
+    assert crossing_motion(problem, 250) is None
+
+
 def test_where_there_is_no_way_there_is_no_motion() -> None:
     values = np.ones((6, 12))
     values[2, :6], values[3, 6:] = 0.0, 0.0

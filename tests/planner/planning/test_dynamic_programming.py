@@ -1,11 +1,18 @@
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planner.cell.scan import load_scan
+from planner.commands.plan import problem_of
+from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
+from planner.map.map_builder import build_maps
+from planner.map.map_problem import map_problem
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.dynamic_programming import dynamic_programming
 from planner.planning.interpolated_planner import interpolated_plan
@@ -59,11 +66,11 @@ def test_on_a_tiny_map_the_verdict_and_the_cost_are_those_of_trying_every_motion
         assert not is_forbidden_on_the_way(problem.map, outcome)
 
 
-@pytest.mark.parametrize("problem_of", [of_noise(0.02), of_noise(0.1), near_the_limit, of_gaps(3)])
-def test_a_plan_costs_what_the_best_path_of_a_fine_lattice_costs(problem_of: type) -> None:
+@pytest.mark.parametrize("family", [of_noise(0.02), of_noise(0.1), near_the_limit, of_gaps(3)])
+def test_a_plan_costs_what_the_best_path_of_a_fine_lattice_costs(family: Callable[[int], Problem]) -> None:
     ratios = []
     for seed in range(4):
-        problem = problem_of(seed)
+        problem = family(seed)
         outcome, optimum = dynamic_programming(problem), lattice_cost(problem)
         if isinstance(outcome, NoPlan):
             assert math.isinf(optimum)
@@ -94,6 +101,25 @@ def test_a_plan_costs_no_more_than_that_of_the_interpolated_cost_to_go(seed: int
 )
 def test_what_a_grid_is_too_coarse_for_is_found(problem: Problem) -> None:
     assert not is_forbidden_on_the_way(problem.map, planned(problem))
+
+
+@pytest.fixture(scope="module", params=[100, 90])
+def cylinder(request: pytest.FixtureRequest) -> Problem:
+    """The shipped scan at a number of angles, in the configuration of its best plan."""
+    scan, configuration = load_scan("cylinder"), Configuration.LEFTY_ABOVE_NOFLIP
+    return problem_of(scan, build_maps(map_problem(scan), [configuration], request.param)[configuration], None)
+
+
+@pytest.mark.parametrize("limit_deg_s", [22.5, 23.0, 23.5, 24.0, 25.0])
+def test_the_shipped_cylinder_is_planned_for_a_table_hardly_fast_enough(cylinder: Problem, limit_deg_s: float) -> None:
+    problem = replace(cylinder, limits=Limits(limit_deg_s, cylinder.limits.acceleration_deg_s2), weights=None)
+    assert not is_forbidden_on_the_way(problem.map, planned(problem))
+
+
+def test_the_shipped_cylinder_is_refused_with_a_proof_for_a_table_too_slow(cylinder: Problem) -> None:
+    outcome = dynamic_programming(replace(cylinder, limits=Limits(20.0), weights=None))
+    assert isinstance(outcome, NoPlan)
+    assert outcome.infeasibility is Infeasibility.UNREACHABLE
 
 
 @pytest.mark.parametrize("seed", range(40))

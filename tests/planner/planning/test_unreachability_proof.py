@@ -85,6 +85,15 @@ def test_it_tells_what_the_limits_allow_from_what_they_do_not() -> None:
     assert first_unreachable_location(wall_with_a_gap(47), 32) == 12
 
 
+def test_a_proof_that_takes_too_much_work_is_given_up() -> None:
+    values = 0.1 + 0.9 * np.random.default_rng(1).random((20, 360))
+    values[values < 0.3] = 0.0
+    values[18, 20:], values[19, :30] = 0.0, 0.0
+    problem = Problem(ConfigurationMap(values), 0.05)
+    assert first_unreachable_location(problem, 32) == 19
+    assert first_unreachable_location(problem, 8000) is None
+
+
 def test_reversing_within_one_sample_takes_room() -> None:
     # A single sample that is passed must be passed at rest, so the table cannot come from 30 deg/s.
     values = np.zeros((4, 36))
