@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from planner.kinematics.arm import Arm
-from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
 from planner.planning.arm_motion import ArmMotion, arm_motion
 from planner.planning.arm_on_path import ArmOnPath
@@ -16,7 +15,6 @@ from planner.planning.plan import make_plan
 from planner.planning.problem import Problem
 from tests.planner.winding_arm import winding_arm
 
-CONFIGURATION = Configuration.LEFTY_ABOVE_NOFLIP
 SIGN = np.array([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0])
 OFFSET_DEG = np.array([10.0, -20.0, 90.0, 37.0, -5.0, 123.0])
 
