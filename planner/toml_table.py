@@ -128,15 +128,23 @@ class TomlTable:
             return [TomlTable(self.file, item, f"{self._prefix}{key}[{i + 1}].") for i, item in enumerate(value)]
         return [self.table(key)]
 
+    def only(self, *known: str) -> None:
+        """Refuse keys other than those, before a key that is missing for their sake.
+
+        Raises:
+            ScanFileError: The first such key, with those that are known here.
+        """
+        for key in self._values:
+            if key not in known:
+                raise self._unknown(key, *known)
+
     def finish(self) -> None:
         """Refuse keys that nothing has read.
 
         Raises:
             ScanFileError: One such key, with those that are known here.
         """
-        for key in self._values:
-            if key not in self._read:
-                raise self._unknown(key, *self._read)
+        self.only(*self._read)
 
 
 def _is_number(value: object) -> bool:

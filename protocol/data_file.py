@@ -56,13 +56,22 @@ def shown(value: object) -> str:
         text = repr(value)
     except (ValueError, RecursionError):  # an integer of thousands of digits, or very deep nesting
         return f"a very long {type(value).__name__}"
+    return shortened(text)
+
+
+def shortened(text: str) -> str:
+    """Return a text as it is shown in a message, cut where it is long."""
     return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}..."
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return the end of a sentence that offers the known name nearest to an unknown one; empty where none is near."""
-    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.7)
-    return f"; did you mean {near[0]}?" if near else ""
+    """Return the end of a sentence that offers the known name nearest to an unknown one; empty where none is near.
+
+    Capitals are no difference.
+    """
+    folded = {each.casefold(): each for each in known}
+    near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.7)
+    return f"; did you mean {folded[near[0]]}?" if near else ""
 
 
 def _parsed(text: str, path: Path, kind: str, parse: Callable[[str], Any]) -> Any:  # noqa: ANN401 - as above

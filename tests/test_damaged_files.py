@@ -8,6 +8,7 @@ import pytest
 import emulator.__main__
 import planner.__main__
 import protocol.conformance.__main__
+import tools.identify
 import tools.plot_trace
 import tools.tune
 from tests.planner.run_examples import write_short_scan
@@ -74,6 +75,16 @@ def tuned_config(file: Path, out: Path) -> tuple[Command, list[str]]:
     return tools.tune.main, ["--config", str(file), "--out", str(out)]
 
 
+def recording(file: Path, out: Path) -> tuple[Command, list[str]]:
+    return tools.identify.main, ["fit", str(file), "--out", str(out.with_suffix(".toml"))]
+
+
+def known_config(file: Path, out: Path) -> tuple[Command, list[str]]:
+    sound = file.with_name("recording.csv")
+    sound.write_text("time_s,position_deg\n")
+    return tools.identify.main, ["fit", str(sound), "--config", str(file), "--out", str(out.with_suffix(".toml"))]
+
+
 def profile(file: Path, out: Path) -> tuple[Command, list[str]]:
     main = protocol.conformance.__main__.main
     return main, ["--port", "emulator://", "--profile", str(file), "--out", str(out)]
@@ -84,7 +95,7 @@ def record(file: Path, _: Path) -> tuple[Command, list[str]]:
 
 
 def trace(file: Path, out: Path) -> tuple[Command, list[str]]:
-    return tools.plot_trace.main, [str(file), str(out.with_suffix(".png"))]
+    return tools.plot_trace.main, [str(file), "--out", str(out.with_suffix(".png"))]
 
 
 READERS = {
@@ -100,6 +111,8 @@ READERS = {
     "run.json": ("run.json", run_folder),
     "emulator --config": ("table_under_test.toml", table_config),
     "tune --config": ("table_under_test.toml", tuned_config),
+    "identify fit trace.csv": ("trace_under_test.csv", recording),
+    "identify fit --config": ("table_under_test.toml", known_config),
     "conformance --profile": ("profile_under_test.toml", profile),
     "conformance --replay": ("record_under_test.json", record),
     "plot_trace": ("trace_under_test.csv", trace),
@@ -135,7 +148,7 @@ def test_a_damaged_file_is_one_line_and_status_2(
     reader: str, damage: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     name, arguments_for = READERS[reader]
-    file = tmp_path / "in" / name
+    file = tmp_path / "folder_under_test" / name
     file.parent.mkdir()
     if damage == "folder":
         file.mkdir()
@@ -143,7 +156,11 @@ def test_a_damaged_file_is_one_line_and_status_2(
         file.write_bytes(content)
     if reader == "emulator --config" and damage == "only a byte order mark":
         pytest.skip("an empty file of constants is a sound one; the table would run")
-    if damage == "only a byte order mark" and reader in {"tune --config", "conformance --profile"}:
+    if damage == "only a byte order mark" and reader in {
+        "tune --config",
+        "identify fit --config",
+        "conformance --profile",
+    }:
         pytest.skip("an empty file is a sound one: all defaults")
     command, arguments = arguments_for(file, tmp_path / "out")
     status = status_of(command, arguments)
@@ -152,5 +169,5 @@ def test_a_damaged_file_is_one_line_and_status_2(
     lines = [line for line in said.splitlines() if not line.startswith("usage:") and line.strip()]
     assert len(lines) == 1
     assert "Traceback" not in said
-    assert name in said or file.parent.name in said
+    assert (file.parent.name if name == "run.json" else name) in said
     assert len(said) < 1500

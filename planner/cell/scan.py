@@ -83,6 +83,7 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progre
     if not file.is_file():
         raise ScanFileError(f"{scan} is neither a scan file nor one of the shipped scans {', '.join(shipped_scans())}")
     top = TomlTable.load(file)
+    top.only("cell", "workpiece", "path", "value", "limits", "weights")
     with _named(file):
         cell, bodies = _read_cell(top.table("cell"), file.parent)
         workpiece, mesh, mesh_file = _read_workpiece(top.table("workpiece"), file.parent, say, progress)
@@ -93,7 +94,6 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progre
         weights = _read_weights(top.table("weights"), limits)
         if costs_overflow(weights, limits, len(path.T_WS)):
             raise ScanFileError(f"{file}: weights: k_a or k_w is so large that the cost of a path overflows; lower it")
-    top.finish()
     return Scan(file.stem, cell, bodies, workpiece, mesh, mesh_file, path, value, limits, weights)
 
 

@@ -80,7 +80,8 @@ def at_scan_speed(
     lengths = np.linalg.norm(np.diff(on_surface, axis=0), axis=1).max(axis=1)
     moving = np.concatenate(([True], lengths > 1e-9))
     waypoints, travelled = waypoints[moving], np.concatenate(([0.0], np.cumsum(lengths)))[moving]
-    steps = travelled[-1] / (speed_mm_s * step_s)
+    with np.errstate(over="ignore", divide="ignore"):
+        steps = travelled[-1] / (speed_mm_s * step_s)
     if not steps < MOST_LOCATIONS:
         raise PathError(
             f"a path of {travelled[-1]:.0f} mm at scan_speed_mm_s {speed_mm_s:g} with time_step_s {step_s:g} has"

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.whole_file import whole_file
+from protocol.data_file import shortened
 from tools.emulated import Array
 from tools.identification.csv_table import Row, Table, check_decimals, read_table
 from tools.identification.errors import RecordingError
@@ -100,8 +101,9 @@ def read_recording(path: Path) -> WireRecording | DriveRecording:
         table = _in_order(table)
         columns = ([table.number(row, name, row.cells[name]) for row in table.rows] for name in names)
         return DriveRecording(*map(np.array, columns))
+    columns_there = shortened(", ".join(table.names)) or "(none)"
     raise RecordingError(
-        f"{path}: has the columns {', '.join(table.names) or '(none)'}; needed are {', '.join(COLUMNS)} "
+        f"{path}: has the columns {columns_there}; needed are {', '.join(COLUMNS)} "
         "(over the wire), or time_s, duty and position_deg or encoder_deg (from a drive)"
     )
 

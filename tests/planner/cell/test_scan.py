@@ -80,7 +80,27 @@ def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
         ("comfortable_clearance_mm = 30", "comfortable_clearance_mm = 4", "the first must be the smaller"),
         ("0.2, 0.2]", "0.2, -1]", "needed are 8 finite numbers"),
         ("table_speed_deg_s = 40", "table_speed_deg_s = 0", "limits.table_speed_deg_s is 0; it must be"),
-        ("[limits]", "[limit]", "limit is not a known key; known are limits; did you mean limits"),
+        (
+            "[limits]",
+            "[limit]",
+            "limit is not a known key; known are cell, limits, path, value, weights, work",
+        ),
+        ("[workpiece]", "[workpeice]", "workpeice is not a known key; known are cell, limits, path, value,"),
+        ("[workpiece]", "[WORKPIECE]", "value, weights, workpiece; did you mean workpiece?"),
+        ("[workpiece]", "[part]", "part is not a known key; known are cell,"),
+        ("class =", "clas =", "workpiece.clas is not a known key; did you mean class? workpiece.class is missing"),
+        (
+            "scan_speed_mm_s = 30",
+            "scan_speed_mm_s = 1e-6",
+            "2.98e+09 locations; at most 20,000 are allowed: scan",
+        ),
+        ("scan_speed_mm_s = 30", "scan_speed_mm_s = 5e-324", "has inf locations; at most 20,000 are allowed"),
+        ("time_step_s = 0.5", "time_step_s = 1e-6", "locations; at most 20,000 are allowed: scan faster, or in longer"),
+        (
+            "[cell]",
+            "[cell.probe]\nline_width_mm = 1e-6\n[cell]",
+            "the pattern has more than 1,000 strips; is the",
+        ),
         ("[limits]", "[limits", "is not TOML"),
         (
             "diameter_mm = 160",

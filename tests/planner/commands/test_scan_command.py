@@ -95,6 +95,18 @@ def test_three_decimals_without_backlash_and_with_exact_calibration_lie_within_3
     assert parts["backlash"]["displacement_mm"] < 0.003  # to a count of the encoder
 
 
+def test_encoder_and_backlash_of_the_account_are_those_of_the_table_at_the_port(scan_file: str, tmp_path: Path) -> None:
+    (tmp_path / "table.toml").write_text("[encoder]\nlines = 24\n[gears]\nbacklash_arcmin = 30.0\n")
+    options = ["--decimals", "3", "--exact-calibration", "--port", f"emulator://?config={tmp_path / 'table.toml'}"]
+    assert main(["scan", scan_file, *QUICK, *options, "--rate", "10", "--out", str(tmp_path)]) == 0
+    error = scanned(tmp_path)["error_mm"]
+    count_deg = 360.0 / (24 * 4 * 480.0)
+    encoder_mm = np.radians(count_deg) / np.sqrt(12.0) * error["radius_mm"]
+    assert error["parts"]["encoder"]["displacement_mm"] == pytest.approx(encoder_mm, rel=0.2)
+    half_gap_mm = np.radians(0.5 * 30.0 / 60.0) * error["radius_mm"]
+    assert error["parts"]["backlash"]["displacement_mm"] == pytest.approx(half_gap_mm, rel=0.1)
+
+
 def test_one_decimal_costs_what_the_closed_form_says(scan_file: str, tmp_path: Path) -> None:
     assert main(["scan", scan_file, *QUICK, "--out", str(tmp_path)]) == 0
     error = scanned(tmp_path)["error_mm"]

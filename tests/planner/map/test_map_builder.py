@@ -15,7 +15,7 @@ from planner.geometry.transforms import rotations_z
 from planner.kinematics.configuration import Configuration
 from planner.kinematics.inverse_kinematics import inverse_kinematics
 from planner.kinematics.value import FACTORS, RatedPoses, UserFactor, ValueFunction
-from planner.map.config_map import DEFAULT_EPSILON, ConfigurationMap
+from planner.map.config_map import DEFAULT_EPSILON, ConfigurationMap, ConfigurationMapError
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import MapProblem, map_problem
 from planner.map.map_reasons import FIRST_PAIR, FIRST_USER_FACTOR
@@ -191,6 +191,13 @@ def test_a_users_factor_multiplies_into_the_map_and_may_forbid() -> None:
     assert texts[FIRST_USER_FACTOR] == "excluded by late is worse"
     assert sum(len(poses.joints) for poses in seen) == plain.allowed.sum()
     assert max(poses.clearance_mm.max() for poses in seen) <= posed.value.comfortable_clearance_mm
+
+
+def test_more_cells_than_memory_can_hold_are_refused_before_the_map_is_begun() -> None:
+    done: list[tuple[int, int]] = []
+    with pytest.raises(ConfigurationMapError, match="57,600,000 cells; at most 50,000,000 are allowed: take fewer ang"):
+        build_maps(cylinder(12), ALL, 600_000, lambda *now: done.append(now))
+    assert done == []
 
 
 @pytest.mark.parametrize("wrong", [2.0, -0.1, float("nan")])
