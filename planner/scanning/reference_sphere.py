@@ -10,9 +10,10 @@ from planner.cell.cell import placement
 from planner.cell.scan_path import looking_at
 from planner.geometry.transforms import rigid_inverse, rotations_z
 from planner.scanning.alignment import Calibration
-from planner.scanning.calibration import AxisCalibration, PartSize, calibrate_table_axis, fit_sphere
+from planner.scanning.calibration import AxisCalibration, PartSize, calibrate_table_axis
 from planner.scanning.probe import LaserProbe
 from planner.scanning.probe_calibration import ProbeCalibration, calibrate_probe
+from planner.scanning.sphere_fit import fit_sphere
 
 _RADIUS_MM = 15.0
 # Where on the table the sphere stands for the axis; on it, turned by nothing, for the probe.

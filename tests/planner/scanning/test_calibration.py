@@ -12,12 +12,11 @@ from planner.scanning.calibration import (
     CalibrationError,
     PartSize,
     calibrate_table_axis,
-    fit_sphere,
-    sphere_centre,
 )
 from planner.scanning.probe import LaserProbe
 from planner.scanning.probe_calibration import calibrate_probe, cube_turns
 from planner.scanning.reference_sphere import calibrate_cell, profile_of_sphere, views_of
+from planner.scanning.sphere_fit import fit_sphere, sphere_centre
 from tools.bench.calibration import AXIS_TRIALS, PROBE_TRIALS
 
 TRUE = Calibration.of(Cell())

@@ -1,0 +1,80 @@
+"""Fit a sphere of known radius to points of it."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from planner.arrays import FloatArray
+from planner.scanning.calibration import CalibrationError
+
+# A sphere of known radius has three unknowns; a second centre whose residual is up to this larger fits as well.
+_FEWEST_POINTS = 4
+_RIVAL_RATIO = 1.5
+
+
+class SphereFit(NamedTuple):
+    """A sphere of known radius through points.
+
+    Attributes:
+        centre: `(3,)` in mm.
+        rms_mm: Root mean square of the points' heights above it.
+        deviations_mm: `(3,)` standard deviation of each coordinate of the centre, for heights with the given noise.
+    """
+
+    centre: FloatArray
+    rms_mm: float
+    deviations_mm: FloatArray
+
+
+def sphere_centre(points: FloatArray, radius_mm: float) -> FloatArray:
+    """Return the centre `(3,)` of a sphere of known radius through points `(m, 3)`, by least squares.
+
+    Points in one plane, as of a single profile, fit two spheres, one on each side of their plane; they are refused.
+
+    Raises:
+        CalibrationError: There are fewer than 4 points, or two centres fit equally well.
+    """
+    return fit_sphere(points, radius_mm).centre
+
+
+def fit_sphere(points: FloatArray, radius_mm: float, noise_mm: float = 0.0) -> SphereFit:
+    """Return the sphere of known radius through points `(m, 3)`, with its uncertainty; see `sphere_centre`.
+
+    Args:
+        points: In mm.
+        radius_mm: The sphere's radius.
+        noise_mm: Standard deviation of the points' heights.
+    """
+    if len(points) < _FEWEST_POINTS or not np.isfinite(points).all():
+        raise CalibrationError(f"a sphere's centre needs at least {_FEWEST_POINTS} points, all of them finite")
+
+    def heights(centre: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.norm(points - centre, axis=1) - radius_mm)
+
+    # |p|^2 = 2 p.c + (r^2 - |c|^2) is linear and gives the start.
+    middle = points.mean(axis=0)
+    design = np.column_stack((2.0 * (points - middle), np.ones(len(points))))
+    start = middle + np.linalg.lstsq(design, np.sum((points - middle) ** 2, axis=1), rcond=None)[0][:3]
+    across = np.linalg.svd(points - middle, full_matrices=False)[2][2]
+    # Where the points are nearly flat, the linear fit leaves the side open: both are tried.
+    offset_mm = (start - middle) @ across
+    height_mm = np.sqrt(max(radius_mm**2 - np.mean(np.sum((points - middle) ** 2, axis=1)), (0.1 * radius_mm) ** 2))
+    ends = [
+        least_squares(heights, start + (side * height_mm - offset_mm) * across, x_scale=radius_mm)
+        for side in (1.0, -1.0)
+    ]
+    ends.sort(key=lambda end: float(end.cost))
+    one, other = (end.x for end in ends)
+    if (
+        ends[1].cost <= _RIVAL_RATIO**2 * ends[0].cost + 1e-12 * len(points)
+        and np.linalg.norm(one - other) > 0.01 * radius_mm
+    ):
+        a, b = (", ".join(f"{value:.2f}" for value in centre) for centre in (one, other))
+        raise CalibrationError(
+            f"the points of the sphere lie in one plane; centres at ({a}) and ({b}) mm fit equally well:"
+            " take profiles from another place as well"
+        )
+    jacobian = np.asarray(ends[0].jac)
+    deviations_mm = noise_mm * np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)))
+    return SphereFit(one, float(np.sqrt(np.mean(ends[0].fun ** 2))), deviations_mm)
