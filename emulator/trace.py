@@ -6,6 +6,9 @@ rest costs nothing and a line drawn through the rows is still the true one.
 
 import csv
 import os
+import zipfile
+import zlib
+from collections.abc import Mapping
 from contextlib import suppress
 from operator import attrgetter
 from pathlib import Path
@@ -38,6 +41,7 @@ class Trace(NamedTuple):
 
 
 _COLUMNS = Trace._fields
+_LONGEST_REASON = 200
 _BYTES = ("received", "transmitted")
 _WORDS = ("gain_set", "state")
 _NUMBERS = tuple(name for name in _COLUMNS if name not in {*_WORDS, *_BYTES})
@@ -159,9 +163,16 @@ def read_trace(path: Path) -> Trace:
         ValueError: the file is no trace.
         OSError: the file cannot be read.
     """
-    import numpy as np  # noqa: PLC0415  # the stand-in itself runs without numpy
+    try:
+        return _trace_of(_read_npz(path) if path.suffix == ".npz" else _read_csv(path))
+    except UnicodeError as error:
+        raise ValueError(f"{path}: is no trace: it is not text in ASCII") from error
+    except (ValueError, TypeError, EOFError, NotImplementedError, csv.Error, zipfile.BadZipFile, zlib.error) as error:
+        raise ValueError(f"{path}: is no trace: {' '.join(str(error)[:_LONGEST_REASON].split())}") from error
 
-    columns = _read_npz(path) if path.suffix == ".npz" else _read_csv(path)
+
+def _trace_of(columns: Mapping[str, Any]) -> Trace:
+    import numpy as np  # noqa: PLC0415  # the stand-in itself runs without numpy
 
     def numbers(name: str) -> "NDArray[np.float64]":
         return np.array(columns[name], dtype=np.float64)
@@ -215,7 +226,7 @@ def _read_csv(path: Path) -> dict[str, list[str]]:
     with path.open(encoding="ascii", newline="") as file:
         rows = csv.reader(file)
         if tuple(next(rows, ())) != _COLUMNS:
-            raise ValueError(f"{path}: is no trace; its first line must be {','.join(_COLUMNS)}")
+            raise ValueError(f"its first line must be {','.join(_COLUMNS)}")
         columns = [list(column) for column in zip(*rows, strict=True)] or [[] for _ in _COLUMNS]
     return dict(zip(_COLUMNS, columns, strict=True))
 
@@ -223,9 +234,9 @@ def _read_csv(path: Path) -> dict[str, list[str]]:
 def _read_npz(path: Path) -> "dict[str, NDArray[np.float64 | np.str_]]":
     import numpy as np  # noqa: PLC0415  # the stand-in itself runs without numpy
 
-    with np.load(path, allow_pickle=False) as file:
+    with path.open("rb") as data, np.load(data, allow_pickle=False) as file:
         if set(file.files) != set(_COLUMNS):
-            raise ValueError(f"{path}: is no trace; its arrays must be {', '.join(_COLUMNS)}")
+            raise ValueError(f"its arrays must be {', '.join(_COLUMNS)}")
         return {name: file[name] for name in _COLUMNS}
 
 

@@ -115,6 +115,7 @@ READERS = {
     "identify fit --config": ("table_under_test.toml", known_config),
     "conformance --profile": ("profile_under_test.toml", profile),
     "conformance --replay": ("record_under_test.json", record),
+    "plot_trace npz": ("trace_under_test.npz", trace),
     "plot_trace": ("trace_under_test.csv", trace),
 }
 DAMAGES: dict[str, bytes | None] = {

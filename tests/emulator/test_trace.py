@@ -115,6 +115,20 @@ def test_a_file_that_is_no_trace_is_refused(tmp_path: Path) -> None:
             read_trace(tmp_path / name)
 
 
+@pytest.mark.parametrize("name", ["run.csv", "run.npz"])
+def test_a_trace_that_was_cut_or_changed_is_refused_by_its_name(name: str, tmp_path: Path) -> None:
+    with TraceWriter(tmp_path / name, TICK_HZ) as trace:
+        trace.record(Table(load_config()).status(), b"H\r", b"")
+    whole, rng = (tmp_path / name).read_bytes(), np.random.default_rng(0)
+    damaged = [whole[:-1], *(whole[: rng.integers(1, len(whole) - 1)] for _ in range(20))]
+    index = whole.find(b"PK\x01\x02")  # where the archive's own list of its files begins
+    damaged += [whole[: index + 8] + b"\x41" + whole[index + 9 :], whole.replace(b"0", b"\xff")]
+    for content in damaged[:-1] if name.endswith("npz") else damaged[-1:]:
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(ValueError, match=f"{name}: is no trace: "):
+            read_trace(tmp_path / name)
+
+
 @contextmanager
 def largest_file(size: int) -> Iterator[None]:
     """Let no file of this process grow beyond a size, as on a full disk."""
