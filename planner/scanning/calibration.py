@@ -95,6 +95,8 @@ def calibrate_table_axis(
         CalibrationError: The centres do not determine the axis well enough, or do not lie as on a turning table.
     """
     _check_angles(centres_B, angles_deg)
+    if noise_mm is not None:
+        check_noise(noise_mm)
     start, seat_T = _start(centres_B, angles_deg, nominal_T_BT)
 
     def residuals(unknown: FloatArray) -> FloatArray:
@@ -207,6 +209,12 @@ def _check_angles(centres_B: FloatArray, angles_deg: FloatArray) -> None:
             f"the {len(angles_deg)} table angles are only {places} distinct places; the axis needs at least"
             f" {_FEWEST_PLACES} that are {_SAME_PLACE_DEG:g} deg apart"
         )
+
+
+def check_noise(noise_mm: float) -> None:
+    """Refuse a noise that nothing can be held against."""
+    if not 0.0 < noise_mm < np.inf:
+        raise CalibrationError(f"the noise is {noise_mm:g} mm; it must be a finite number above 0")
 
 
 def _distinct_places(angles_deg: FloatArray) -> int:

@@ -12,7 +12,7 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from planner.arrays import FloatArray
-from planner.scanning.calibration import GREATEST_POINT_ERROR_MM, CalibrationError
+from planner.scanning.calibration import GREATEST_POINT_ERROR_MM, CalibrationError, check_noise
 from planner.scanning.probe_fit import CENTRE, RADIUS, SHIFT, TURN, ProbeFit, Views, fit_heights, fit_rays
 from planner.scanning.score_tests import FALSE_ALARMS, Change, NormalEquations, find_change
 
@@ -97,6 +97,7 @@ def calibrate_probe(
         CalibrationError: The views do not determine the place, or contradict each other.
     """
     _check_views(T_BF, points_S, radius_mm)
+    check_noise(noise_mm)
     thinned = Views.of(T_BF, [view[:: max(1, len(view) // _SEARCH_POINTS)] for view in points_S])
     found = [fit_heights(thinned, radius_mm, guess) for guess in cube_turns(nominal_T_FS)]
     best = min(found, key=lambda end: end.rms_mm)
@@ -245,8 +246,9 @@ def _check_views(T_BF: FloatArray, points_S: Sequence[FloatArray], radius_mm: fl
 def _covariance(fit: ProbeFit) -> FloatArray:
     """Return the covariance of the unknowns; infinite where the views do not determine them."""
     information = fit.jacobian.T @ fit.jacobian
-    scale = 1.0 / np.sqrt(np.diag(information))
-    scaled = information * scale * scale[:, np.newaxis]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = 1.0 / np.sqrt(np.diag(information))
+        scaled = information * scale * scale[:, np.newaxis]
     if not np.isfinite(scaled).all() or np.linalg.cond(scaled) > 1e13:
         return np.full_like(information, np.inf)
     return np.asarray(np.linalg.inv(scaled) * scale * scale[:, np.newaxis])

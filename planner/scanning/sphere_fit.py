@@ -49,6 +49,9 @@ def fit_sphere(points: FloatArray, radius_mm: float, noise_mm: float = 0.0) -> S
     if len(points) < _FEWEST_POINTS or not np.isfinite(points).all():
         raise CalibrationError(f"a sphere's centre needs at least {_FEWEST_POINTS} points, all of them finite")
 
+    if not 0.0 < radius_mm < np.inf:
+        raise CalibrationError(f"the sphere's radius is {radius_mm:g} mm; it must be a finite number above 0")
+
     def heights(centre: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.norm(points - centre, axis=1) - radius_mm)
 

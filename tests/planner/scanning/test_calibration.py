@@ -286,6 +286,19 @@ def test_centres_that_do_not_determine_an_axis_are_refused(
         calibrate_table_axis(centres_B, angles_deg, TRUE.T_BT)
 
 
+@pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan, np.inf])
+def test_a_noise_or_radius_that_cannot_be_is_refused(wrong: float) -> None:
+    views = seen_from(TRUE.T_FS, views_of(CENTRE, 8, LaserProbe()))
+    with pytest.raises(CalibrationError, match=r"noise is .* finite number above 0"):
+        calibrate_table_axis(centres(), ANGLES_DEG, TRUE.T_BT, noise_mm=wrong)
+    with pytest.raises(CalibrationError, match=r"noise is .* finite number above 0"):
+        calibrate_probe(*views, RADIUS_MM, TRUE.T_FS, noise_mm=wrong)
+    with pytest.raises(CalibrationError, match="must all be in mm"):
+        calibrate_probe(*views, wrong, TRUE.T_FS)
+    with pytest.raises(CalibrationError, match=r"radius is .* finite number above 0"):
+        sphere_centre(centres(), wrong)
+
+
 def test_a_centre_is_found_from_a_part_of_the_sphere() -> None:
     rng = np.random.default_rng(2)
     normals = rng.normal(size=(400, 3))
