@@ -17,6 +17,8 @@ _POLL_S = 0.005
 _REST_READINGS = 5
 _REST_INTERVAL_S = 0.05
 _REST_TIMEOUT_S = 30.0
+_FAR_S = 0.8
+"""For so long a motion is watched that would lead far away."""
 _READING_BYTES = 10
 """Of `H` and of a reply with three digits, without its decimals."""
 _LEAST_SHARE = 0.1
@@ -60,13 +62,21 @@ class Rig(WireChecks):
 
     def set_speed(self, top_deg_s: float) -> None:
         """Set S."""
-        self.expect(b"S %s" % number(top_deg_s))
-        self.top_deg_s = top_deg_s
+        self.set_speed_text(number(top_deg_s))
+
+    def set_speed_text(self, text: bytes) -> None:
+        """Set S to a number as it goes on the wire."""
+        self.expect(b"S " + text)
+        self.top_deg_s = float(text)
 
     def set_acceleration(self, rate_deg_s2: float) -> None:
         """Set A."""
-        self.expect(b"A %s" % number(rate_deg_s2))
-        self.rate_deg_s2 = rate_deg_s2
+        self.set_acceleration_text(number(rate_deg_s2))
+
+    def set_acceleration_text(self, text: bytes) -> None:
+        """Set A to a number as it goes on the wire."""
+        self.expect(b"A " + text)
+        self.rate_deg_s2 = float(text)
 
     def full_settings(self) -> None:
         """Set S and A to the most that the profile allows."""
@@ -80,9 +90,13 @@ class Rig(WireChecks):
 
     def stand_at_home(self) -> None:
         """Take it that the table rests at home; what was seen of its motion before is forgotten."""
+        self.stand_afresh_at(self.home_deg)
+
+    def stand_afresh_at(self, angle_deg: float) -> None:
+        """Take it that the table rests at an angle; what was seen of its motion before is forgotten."""
         self.motion = MotionRecord()
         self._reference = Reference(self.motion.expectations)
-        self.stand_at(self.home_deg)
+        self.stand_at(angle_deg)
 
     def stand_at(self, angle_deg: float) -> None:
         """Take it that the reference rests at an angle."""
@@ -102,12 +116,28 @@ class Rig(WireChecks):
 
     def move_to(self, angle_deg: float) -> None:
         """Command P, relative to home."""
-        target = self.home_deg + angle_deg
-        self._move(b"P %s" % number(target), lambda _: target)
+        self.move_to_text(number(self.home_deg + angle_deg))
+
+    def move_to_text(self, text: bytes) -> None:
+        """Command P with a number as it goes on the wire."""
+        self._move(b"P " + text, lambda _: float(text))
 
     def move_by(self, angle_deg: float) -> None:
         """Command R."""
-        self._move(b"R %s" % number(angle_deg), lambda position: position + angle_deg)
+        self.move_by_text(number(angle_deg))
+
+    def move_by_text(self, text: bytes) -> None:
+        """Command R with a number as it goes on the wire."""
+        self._move(b"R " + text, lambda position: position + float(text))
+
+    def begin_far_motion(self, command: bytes) -> None:
+        """Begin a slow motion that leads far away, with a whole P or R, see its first part, and stop it."""
+        letter, text = command[:2], command[2:]
+        self.settings(min(2, self.profile.motion.speed_deg_s), self.profile.motion.acceleration_deg_s2)
+        (self.move_to_text if letter == b"P " else self.move_by_text)(text)
+        self.follow(_FAR_S)
+        self.move_by(0)
+        self.finish(command.decode())
 
     def reference_at(self, time_s: float) -> tuple[float, float]:
         """Return where the reference should be at a time, and its speed."""

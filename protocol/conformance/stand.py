@@ -8,6 +8,7 @@ import json
 import shlex
 import socket
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from shutil import which
@@ -20,6 +21,7 @@ from protocol.port import Port
 TRIGGER = "a trigger input that the rig can drive"
 POWER_CYCLE = "a way to switch the table off and on"
 PRESET = "a way to preset the position counter"
+OBSERVER = "a view of the encoder beside the wire"
 ERROR_REPLIES = "error replies"
 STRICT = "strict Table 1 mode"
 DISCONNECT = "a table that sees its client go"
@@ -53,6 +55,14 @@ class Stand(Protocol):
         """Switch the table off and on, with its counter at `count`."""
         ...
 
+    def encoder_deg(self) -> float:
+        """Return the encoder's position now, as it is inside the table."""
+        ...
+
+    def trigger_within(self, share: float) -> float:
+        """Put an edge at a share (0..1) of the table's coming tick, and return the encoder's position at the edge."""
+        ...
+
 
 class WireOnly:
     """Nobody stands beside the wire."""
@@ -71,14 +81,27 @@ class WireOnly:
         """Refuse."""
         raise StandError(f"the rig has no way to preset the counter to {count}")
 
+    def encoder_deg(self) -> float:
+        """Refuse."""
+        raise StandError("the rig does not see the encoder")
+
+    def trigger_within(self, share: float) -> float:
+        """Refuse."""
+        raise StandError(f"the rig cannot trigger the table at {share:g} of a tick")
+
 
 class InProcess:
     """A simulated table behind a port of this process; it is used as what it offers, not as what it is."""
 
-    capabilities = frozenset({TRIGGER, POWER_CYCLE, PRESET})
+    capabilities = frozenset({TRIGGER, POWER_CYCLE, PRESET, OBSERVER})
 
     def __init__(self, table: Any) -> None:  # noqa: ANN401  # the package that makes it is none of ours
         self._table = table
+
+    @property
+    def counts_per_deg(self) -> float:
+        """Counts of the table's own registers to the degree."""
+        return float(self._table.config.counts_per_turn) / 360.0
 
     def trigger(self) -> None:
         """Put one edge on the trigger input, now."""
@@ -92,8 +115,20 @@ class InProcess:
         """Switch the table off and on, with its counter at `count`."""
         self._table.reset(count)
 
+    def encoder_deg(self) -> float:
+        """Return the encoder's position now."""
+        return float(self._table.status().encoder_deg)
 
-class ControlChannel:
+    def trigger_within(self, share: float) -> float:
+        """Put an edge at a share (0..1) of the coming tick, and return the encoder's position at the edge."""
+        before_deg = self.encoder_deg()
+        self._table.trigger(share)
+        if share:
+            self._table.advance(1)
+        return before_deg + share * (self.encoder_deg() - before_deg)
+
+
+class ControlChannel(WireOnly):
     """The control channel of a stand-in: a line of JSON each way on a Unix socket."""
 
     capabilities = frozenset({TRIGGER, POWER_CYCLE, PRESET})
@@ -191,6 +226,15 @@ class RecordedStand:
         self._note(f"preset {count}")
         self._stand.preset(count)
 
+    def encoder_deg(self) -> float:
+        """Return the encoder's position now, which is not recorded."""
+        return self._stand.encoder_deg()
+
+    def trigger_within(self, share: float) -> float:
+        """Put an edge at a share (0..1) of the coming tick, and return the encoder's position at the edge."""
+        self._note("trigger")
+        return self._stand.trigger_within(share)
+
 
 def stand_beside(port: Port, control: Path | None, profile: Profile) -> Stand:
     """Return what can be done to the table at a port.
@@ -204,6 +248,14 @@ def stand_beside(port: Port, control: Path | None, profile: Profile) -> Stand:
     if table is not None:
         return InProcess(table)
     return Programs(profile.rig.trigger_command, profile.rig.power_cycle_command)
+
+
+def profile_of_the_table(stand: Stand, profile: Profile) -> Profile:
+    """Return the profile with what the rig can ask the table itself: how many counts its registers have to a degree."""
+    counts_per_deg: float | None = getattr(stand, "counts_per_deg", None)
+    if counts_per_deg is None:
+        return profile
+    return replace(profile, table=replace(profile.table, counts_per_deg=counts_per_deg))
 
 
 def capabilities(stand: Stand, profile: Profile) -> frozenset[str]:

@@ -14,7 +14,7 @@ from protocol.conformance.ports import SessionError
 from protocol.conformance.profile import Profile
 from protocol.conformance.reference import MotionRecord
 from protocol.conformance.rig import Rig
-from protocol.conformance.stand import PRESET, RecordedStand, Stand, StandError, capabilities
+from protocol.conformance.stand import PRESET, RecordedStand, Stand, StandError, capabilities, profile_of_the_table
 from protocol.conformance.verdict import InapplicableError, Measurement, NonconformityError, Verdict
 from protocol.conformance.wire import Event, RecordedPort, Wire
 from protocol.errors import TableError
@@ -48,6 +48,7 @@ class Session:
 
     Attributes:
         capabilities: what cases may need and what there is.
+        profile: what is known of the table, with what the rig can ask it itself.
         home_deg: where the session began, and each moving case begins.
         is_stopped: whether the table was seen to rest when it was stopped last.
         how_it_was_left: the same in words, and where it stands or what it will do.
@@ -62,7 +63,7 @@ class Session:
         self._port = port
         self._watch = watch or Punctual()
         self._wire = Wire(port, profile.byte_s)
-        self._profile = profile
+        self.profile = profile = profile_of_the_table(stand, profile)
         self._stand: Stand = RecordedStand(stand, port.note)
         self._seed = seed
         self.capabilities = capabilities(stand, profile)
@@ -102,7 +103,7 @@ class Session:
             raise
 
     def _run_in_time(self, case: Case) -> Outcome:
-        allowed_s = self._profile.serial.latency_s
+        allowed_s = self.profile.serial.latency_s
         spoiled: list[str] = []
         while True:
             self._watch.restart()
@@ -128,7 +129,7 @@ class Session:
 
     def stop(self) -> None:
         """Stop the table where it is, whatever is on the line, if it still answers."""
-        serial, motion = self._profile.serial, self._profile.motion
+        serial, motion = self.profile.serial, self.profile.motion
         self._is_home = self.is_stopped = False
         try:
             client = TableClient(self._port, serial.timeout_s, serial.decimals, motion.acceleration_deg_s2)
@@ -147,7 +148,7 @@ class Session:
         """
         rig = self._rig("replay")
         self._wire.send(CANCEL)
-        self._wire.drain(SETTLE_S + self._profile.serial.latency_s, PATIENCE_S)
+        self._wire.drain(SETTLE_S + self.profile.serial.latency_s, PATIENCE_S)
         try:
             rig.full_settings()
             position_deg = float(rig.wait_for_rest())
@@ -178,7 +179,7 @@ class Session:
 
     def _rig(self, purpose: str) -> Rig:
         chance = Random(f"{self._seed} {purpose}")  # noqa: S311  # no secret
-        return Rig(self._wire, self._profile, self._stand, self.home_deg, chance)
+        return Rig(self._wire, self.profile, self._stand, self.home_deg, chance)
 
     def _judged(self, case: Case, rig: Rig) -> tuple[Verdict, str]:
         """Return verdict and reason of a case, with the table stopped and its line empty where it failed."""
@@ -208,14 +209,14 @@ class Session:
 
     def _lacking(self, case: Case) -> str:
         """Return why a case cannot be run, or nothing."""
-        waived = self._profile.waive.get(case.clause.number)
+        waived = self.profile.waive.get(case.clause.number)
         if waived is not None:
             return f"waived by the profile: {waived}"
         lacking = sorted(case.needs - self.capabilities)
         if lacking:
             return f"lacks {' and '.join(lacking)}"
-        if case.travel_deg > self._profile.motion.reach_deg:
-            return f"turns by {case.travel_deg:g} deg, the profile allows {self._profile.motion.reach_deg:g}"
+        if case.travel_deg > self.profile.motion.reach_deg:
+            return f"turns by {case.travel_deg:g} deg, the profile allows {self.profile.motion.reach_deg:g}"
         return ""
 
     def _restore(self, case: Case, rig: Rig) -> None:

@@ -1,9 +1,23 @@
 """Chapter 4.1: the grammar of a command."""
 
+from decimal import Decimal
+
 from protocol.conformance.case import case
 from protocol.conformance.rig import Rig
+from protocol.conformance.stand import PRESET
 from protocol.conformance.wire_checks import number
-from protocol.messages import ErrorCode
+from protocol.messages import LINE_LIMIT, ErrorCode, Verb
+
+_LETTERS = {verb.encode() for verb in Verb}
+_PRINTABLE = [bytes((byte,)) for byte in range(0x21, 0x7F)]
+_WRAPS = (
+    *(2**bits for bits in (8, 15, 16, 23, 24, 31, 32, 48, 53, 63, 64, 80)),
+    *(10**n for n in (3, 5, 9, 12, 20, 25)),
+)
+"""Where registers and buffers for the digits of a number may end."""
+
+_LOW = Decimal("0.15")
+"""An S or an A that is a third lower with one decimal."""
 
 _BAD_NUMBER = ErrorCode.BAD_NUMBER
 _OUT_OF_RANGE = ErrorCode.OUT_OF_RANGE
@@ -11,8 +25,10 @@ _OUT_OF_RANGE = ErrorCode.OUT_OF_RANGE
 
 @case("4.1/1")
 def a_letter_begins_a_line(rig: Rig) -> None:
-    """Send lines that begin otherwise."""
-    for line in (b"h", b" H", b"?", b"Q", b"5", b"p 10", b"-", b"OK", b"~"):
+    """Send every other printable byte alone, each letter with a number, and words."""
+    others = [byte for byte in _PRINTABLE if byte not in _LETTERS]
+    numbered = [byte + b" 1" for byte in others if byte.isalpha()]
+    for line in (*others, *numbered, b" H", b"p 10", b"OK", b"ERR 1", b"VER", b"*IDN?", b"$H"):
         rig.refused(line, ErrorCode.UNKNOWN_COMMAND)
 
 
@@ -28,7 +44,7 @@ def spaces_are_free(rig: Rig) -> None:
 @case("4.1/3")
 def a_reading_takes_no_number(rig: Rig) -> None:
     """Send `H` and `L` with something behind."""
-    for line in (b"H 1", b"H0", b"HH", b"L x", b"L ."):
+    for line in (b"H 1", b"H0", b"HH", b"HOME", b"HELP", b"L x", b"L .", b"L0", b"LATCH"):
         rig.refused(line, _BAD_NUMBER)
 
 
@@ -36,22 +52,23 @@ def a_reading_takes_no_number(rig: Rig) -> None:
 def a_setting_takes_exactly_one_number(rig: Rig) -> None:
     """Send settings with no number, with two, and with words."""
     with rig.unmoved(b"a setting without its number"):
-        for line in (b"P", b"R ", b"S", b"A  ", b"P 1 2", b"R 0 0", b"S ten", b"A 1 0"):
+        for line in (b"P", b"R ", b"S", b"A  ", b"P 1 2", b"R 0 0", b"S ten", b"A 1 0", b"RESET", b"STOP", b"STATUS"):
             rig.refused(line, _BAD_NUMBER)
 
 
 @case("4.1/5", travel_deg=2)
 def a_number_may_have_a_sign(rig: Rig) -> None:
-    """Send `+` and `-` with increments that add up to nothing, and `-0`; and `+` with the settings."""
-    rig.expect(b"S +" + number(rig.profile.motion.speed_deg_s))
-    rig.expect(b"A +" + number(rig.profile.motion.acceleration_deg_s2))
-    rig.expect(b"R +2")
-    rig.wait_for_rest()
-    rig.measure("after R +2", float(rig.read()) - rig.home_deg, "deg", *rig.near(2))
-    rig.expect(b"R -2")
-    rig.wait_for_rest()
-    rig.expect(b"R -0")
-    rig.measure("after R -2 and R -0", float(rig.read()) - rig.home_deg, "deg", *rig.near(0))
+    """Send `+` and `-` with all settings; the sign holds for what is below 1, and for whole part and decimals alike."""
+    for letter, limit in ((b"S ", rig.profile.motion.speed_deg_s), (b"A ", rig.profile.motion.acceleration_deg_s2)):
+        rig.expect(letter + b"+" + number(limit))
+        rig.refused(letter + b"-0.25", _OUT_OF_RANGE)
+    steps = [(b"R +2", 2.0), (b"R -2", 0.0), (b"R -0", 0.0), (b"R -0.5", -0.5), (b"R -1.5", -2.0), (b"R +1.5", -0.5)]
+    if rig.home_deg == 0:  # elsewhere these are far away
+        steps += [(b"P -1.5", -1.5), (b"P -0.5", -0.5), (b"P +0.5", 0.5), (b"P -0", 0.0)]
+    for line, expected_deg in steps:
+        rig.expect(line)
+        at_deg = float(rig.wait_for_rest()) - rig.home_deg
+        rig.measure(f"after {line.decode()}", at_deg, "deg", *rig.near(expected_deg))
 
 
 @case("4.1/6")
@@ -72,19 +89,58 @@ def a_number_is_plain(rig: Rig) -> None:
 
 @case("4.1/8", travel_deg=2)
 def all_decimals_count(rig: Rig) -> None:
-    """Move by an increment whose decimals are beyond the first, several times: they add up."""
-    for _ in range(4):
-        rig.expect(b"R 0.2499999999999999999999999")
-        rig.wait_for_rest()
-    rig.measure("4 times 0.25", float(rig.read()) - rig.home_deg, "deg", *rig.near(1))
+    """Move by increments and to positions of 2 to 25 irregular decimals; lead a number with zeros."""
+    rig.expect(b"S " + number(rig.profile.motion.speed_deg_s).rjust(LINE_LIMIT - 2, b"0"))
+    sign = 1
+    for places in (2, 3, 4, 5, 8, 9, 10, 11, 12, 16, 17, 19, 20, 25):
+        rig.move_by_text(_irregular(Decimal(sign), places))
+        rig.follow()
+        rig.move_to_text(_irregular(rig.home_deg + Decimal(sign) / 2, min(places, LINE_LIMIT - 10)))
+        rig.follow()
+        sign = -sign
+    rig.finish("with many decimals")
+
+
+@case("4.1/8:settings", travel_deg=3)
+def all_decimals_of_s_and_a_count(rig: Rig) -> None:
+    """Move with an S, then with an A, that are much lower when a decimal is cut or does not fit a register."""
+    rig.set_speed_text(_irregular(_LOW, 25))
+    rig.move_by(0.8)
+    rig.follow()
+    rig.full_settings()
+    rig.finish("S with 25 decimals")
+    rig.set_acceleration_text(_irregular(_LOW, 11))
+    rig.move_by(1.5)
+    rig.follow()
+    rig.full_settings()
+    rig.finish("A with 11 decimals")
+
+
+@case("4.1/8:whole", PRESET, travel_deg=2)
+def all_digits_of_the_whole_part_count(rig: Rig) -> None:
+    """Begin increments of 2^17 and -2^16 deg, and stop beyond what is left when the number wraps."""
+    for whole in (2**17, -(2**16)):
+        rig.stand.preset(0)
+        rig.stand_afresh_at(0)
+        rig.begin_far_motion(b"R %d.01" % whole)
 
 
 @case("4.1/9")
 def an_unusable_number_is_out_of_range(rig: Rig) -> None:
-    """Send numbers of good form that no table can use."""
+    """Send numbers of good form that no table can use, among them those that a register of 8 to 80 bits would wrap."""
+    limits, range_deg = rig.profile.limits, rig.profile.range_deg
     with rig.unmoved(b"a number out of range"):
         for line in (b"P 99999999999999", b"P -99999999999999", b"R 9999999999999999999999999999", b"S 99999999999"):
             rig.refused(line, _OUT_OF_RANGE)
+        for value in sorted(sign * wrap + 5 for wrap in (*_WRAPS, round(2 * range_deg)) for sign in (1, -1)):
+            for letter, refused in (
+                (b"P", abs(value) > range_deg + 1),
+                (b"R", abs(value) > range_deg + 1),
+                (b"S", not 0 < value <= limits.speed_deg_s),
+                (b"A", not 0 < value <= limits.acceleration_deg_s2),
+            ):
+                if refused:
+                    rig.refused(b"%s %d" % (letter, value), _OUT_OF_RANGE)
 
 
 @case("4.1/10", travel_deg=30)
@@ -125,3 +181,8 @@ def every_command_is_accepted_in_motion(rig: Rig) -> None:
     rig.follow(0.1)
     rig.move_by(5)
     rig.finish()
+
+
+def _irregular(value: Decimal, places: int) -> bytes:
+    """Return a number near a value, its decimals without a pattern."""
+    return f"{value - Decimal(2).sqrt() / 1000 - Decimal(1) / 2**20:.{places}f}".encode()

@@ -7,6 +7,9 @@ from protocol.conformance.verdict import require
 from protocol.conformance.wire_checks import number
 from protocol.messages import LINE_LIMIT, ErrorCode
 
+_PAUSES_S = (0.5, 6.0)
+"""In which a table may forget what it has of a line: the second one within most times that programmers choose."""
+
 
 @case("3.1/1")
 def a_line_ends_in_cr(rig: Rig) -> None:
@@ -22,6 +25,9 @@ def lf_is_ignored(rig: Rig) -> None:
     """Put LF before, within and after commands, and within a number: the speed that it makes is above the limit."""
     for line in (b"\nH", b"H\n", b"\n\nH\n\n"):
         rig.angle_in(rig.ask(line))
+    rig.wire.send(b"H\r\nL\r\nH\n\r")
+    for letter in (b"H", b"L", b"H"):
+        rig.angle_in(rig.reply_to(letter), letter)
     rig.wire.send(b"\n")
     rig.silence("a lone LF")
     too_fast = b"%d" % (10 * rig.profile.limits.speed_deg_s + 10)
@@ -39,7 +45,7 @@ def an_empty_line_has_no_reply(rig: Rig) -> None:
 
 @case("3.1/4")
 def bytes_may_come_slowly(rig: Rig) -> None:
-    """Send a command byte by byte with pauses, and two commands with the cut in mid-line."""
+    """Send a command byte by byte with pauses, two commands with the cut in mid-line, and others with long pauses."""
     line = b"S %s\r" % number(rig.profile.motion.speed_deg_s)
     for index in range(len(line)):
         rig.wire.send(line[index : index + 1])
@@ -50,6 +56,13 @@ def bytes_may_come_slowly(rig: Rig) -> None:
     rig.angle_in(rig.reply_to(b"H"))
     rig.wire.send(b"\r")
     rig.angle_in(rig.reply_to(b"L"), b"L")
+    for pause_s in _PAUSES_S:
+        rig.wire.send(line[:-2])
+        heard = rig.wire.listen(pause_s)
+        require(not heard, f"{line[:-2]!r}, and no CR for {pause_s:g} s, got {heard!r}")
+        rig.wire.send(line[-2:])
+        got = rig.reply_to(line).text
+        require(got == b"OK", f"{line!r}, with a pause of {pause_s:g} s in it, got {got!r}, not b'OK'")
 
 
 @case("3.1/5", DISCONNECT)

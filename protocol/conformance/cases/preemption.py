@@ -23,6 +23,18 @@ def the_speed_does_not_step(rig: Rig) -> None:
     rig.finish()
 
 
+@case("7.3/2:accelerating", travel_deg=40)
+def the_speed_does_not_step_while_it_grows(rig: Rig) -> None:
+    """While the table accelerates be sent a little farther, fifteen times: each time speed and position go on."""
+    top = rig.profile.motion.speed_deg_s
+    rig.settings(top, min(rig.profile.motion.acceleration_deg_s2 / 2, top / (20 * rig.reading_s)))
+    rig.move_to(30)
+    for further in range(15):
+        rig.move_to(30 + further / 2)
+        rig.sample()
+    rig.finish()
+
+
 @case("7.3/3:behind", travel_deg=30)
 def a_target_behind(rig: Rig) -> None:
     """At speed be sent back to the start."""

@@ -1,10 +1,17 @@
 """Chapter 6: the registers and the latch."""
 
+from decimal import ROUND_HALF_EVEN, Decimal
+
 from protocol.conformance.case import case
 from protocol.conformance.rig import Rig
-from protocol.conformance.stand import POWER_CYCLE, PRESET, TRIGGER
+from protocol.conformance.stand import OBSERVER, POWER_CYCLE, PRESET, TRIGGER
 from protocol.conformance.verdict import require
 from protocol.conformance.wire_checks import number
+
+_ODD_SHARE = 0.9371
+"""Of the full speed: a reading's last decimal and a tick's way have no common measure then."""
+_LESS_THAN_A_TICK_S = 1e-6
+"""To wait for so long takes one tick of a simulated table."""
 
 
 @case("6.1/1", TRIGGER, travel_deg=10)
@@ -72,16 +79,16 @@ def registers_are_0_at_power_on(rig: Rig) -> None:
 
 @case("6.2/1", TRIGGER, travel_deg=40)
 def a_trigger_latches_the_position(rig: Rig) -> None:
-    """At constant speed, there and back, trigger between two readings: the latch lies between them."""
+    """At speed, there and back, trigger between two readings, amid commands and replies too: the latch lies between."""
     speed = rig.profile.motion.speed_deg_s / 2
     rig.settings(speed, rig.profile.motion.acceleration_deg_s2)
     worst_deg = 0.0
     for target in (40, 0):
         rig.move_to(target)
         rig.follow(speed / rig.rate_deg_s2 + 0.1)
-        for _ in range(8):
+        for turn in range(8):
             before = rig.sample().position_deg
-            rig.stand.trigger()
+            _TRIGGERS[turn % len(_TRIGGERS)](rig)
             after = rig.sample().position_deg
             latched = float(rig.read(b"L"))
             worst_deg = max(worst_deg, min(before, after) - latched, latched - max(before, after))
@@ -89,14 +96,37 @@ def a_trigger_latches_the_position(rig: Rig) -> None:
     rig.measure("latch outside of the readings around it", worst_deg, "deg", most=rig.profile.resolution_deg)
 
 
+@case("6.2/1:instant", OBSERVER, travel_deg=40)
+def a_trigger_latches_the_very_instant(rig: Rig) -> None:
+    """At full speed trigger twice, within ticks, and where the counter goes over 0: the latch is as the encoder."""
+    rig.set_speed(_ODD_SHARE * rig.top_deg_s)
+    for target in (40, 0):
+        rig.move_to(target)
+        rig.follow(rig.top_deg_s / rig.rate_deg_s2 + 0.02)
+        for turn in range(60):
+            rig.stand.trigger_within(0.5)  # another edge overwrites it at once
+            _require_latched(rig, rig.stand.trigger_within(rig.chance.random() if turn % 4 else 0.0))
+        rig.finish(f"to {target}")
+    for share in (0.02, 0.98, 0.0) if rig.home_deg == 0 else ():
+        for sign in (1, -1):
+            rig.move_to(-2 * sign)
+            rig.finish()
+            rig.move_to(2 * sign)
+            _step_to_the_tick_over_0(rig)
+            if share == 0.0:
+                rig.wire.clock.sleep_s(_LESS_THAN_A_TICK_S)
+            _require_latched(rig, rig.stand.trigger_within(share))
+            rig.finish("over 0")
+
+
 @case("6.2/2", TRIGGER, travel_deg=20)
 def each_trigger_overwrites_the_latch(rig: Rig) -> None:
-    """Latch at three places, with two triggers before each is read."""
-    for target in (10, 20, 0):
+    """Latch at three places, with two triggers before each is read; then twice within two readings, in motion."""
+    for turn, target in enumerate((10, 20, 0)):
         rig.stand.trigger()
         rig.move_to(target)
         rig.finish(f"at {target}")
-        rig.stand.trigger()
+        _TRIGGERS[turn + 1](rig)
         error = float(rig.read(b"L") - rig.read())
         rig.measure(
             f"latch at {target}, from the position",
@@ -105,6 +135,17 @@ def each_trigger_overwrites_the_latch(rig: Rig) -> None:
             -rig.profile.resolution_deg,
             rig.profile.resolution_deg,
         )
+    rig.move_to(20)
+    rig.follow(0.3)
+    rig.stand.trigger()
+    rig.sample()
+    before = rig.sample().position_deg
+    rig.stand.trigger()
+    after = rig.sample().position_deg
+    latched = float(rig.read(b"L"))
+    away = max(before - latched, latched - after)
+    rig.measure("second latch outside of the readings around it", away, "deg", most=rig.profile.resolution_deg)
+    rig.finish()
 
 
 @case("6.2/2:power-on", POWER_CYCLE, travel_deg=10)
@@ -129,3 +170,52 @@ def a_trigger_disturbs_nothing(rig: Rig) -> None:
         rig.angle_in(rig.reply_to(b"H"))
         rig.sample()
     rig.finish()
+
+
+def _trigger_amid_a_command(rig: Rig) -> None:
+    """Trigger while bytes of a command are on the line."""
+    rig.wire.send(b"H".ljust(20))
+    rig.stand.trigger()
+    rig.wire.send(b"\r")
+    rig.angle_in(rig.reply_to(b"H"))
+
+
+def _trigger_amid_a_reply(rig: Rig) -> None:
+    """Trigger while a reply, and nothing else, is on the line."""
+    rig.wire.send(b"H\r")
+    rig.wire.clock.sleep_s(5 * rig.profile.byte_s)
+    rig.stand.trigger()
+    rig.angle_in(rig.reply_to(b"H"))
+
+
+def _trigger_amid_all(rig: Rig) -> None:
+    """Trigger while commands and replies are on the line."""
+    rig.wire.send(b"H\r" * 6)
+    rig.wire.clock.sleep_s(6 * rig.profile.byte_s)
+    rig.stand.trigger()
+    for _ in range(6):
+        rig.angle_in(rig.reply_to(b"H"))
+
+
+_TRIGGERS = (lambda rig: rig.stand.trigger(), _trigger_amid_a_command, _trigger_amid_a_reply, _trigger_amid_all)
+
+
+def _step_to_the_tick_over_0(rig: Rig) -> None:
+    """Let time pass until the encoder's count changes its sign within the next tick."""
+    last_deg = rig.stand.encoder_deg()
+    deadline_s = rig.wire.clock.now_s() + 10
+    while rig.wire.clock.now_s() < deadline_s:
+        rig.wire.clock.sleep_s(_LESS_THAN_A_TICK_S)
+        now_deg = rig.stand.encoder_deg()
+        next_deg = 2 * now_deg - last_deg
+        if now_deg != 0 and (now_deg < 0) != (next_deg < 0):
+            return
+        last_deg = now_deg
+
+
+def _require_latched(rig: Rig, angle_deg: float) -> None:
+    """Require that the latch reads as an angle, to within one count of the encoder."""
+    unit, count_deg = Decimal(1).scaleb(-rig.profile.serial.decimals), 1 / rig.profile.table.counts_per_deg
+    low, high = (Decimal(angle_deg + way * count_deg * 1.001).quantize(unit, ROUND_HALF_EVEN) for way in (-1, 1))
+    latched = rig.read(b"L")
+    require(low <= latched <= high, f"the latch is {latched} deg; at the edge the encoder was at {angle_deg:.4f} deg")

@@ -1,16 +1,24 @@
 """Chapter 2: the serial line."""
 
+from collections.abc import Callable, Iterable, Sequence
+from itertools import cycle, islice
+
 from protocol.conformance.case import case
+from protocol.conformance.ports import is_simulated
 from protocol.conformance.rig import Rig
 from protocol.conformance.stand import ERROR_REPLIES, PACING
 from protocol.conformance.verdict import require
+from protocol.conformance.wire_checks import number
 from protocol.messages import ErrorCode
 
 _TRAIN = 8
 """Commands sent at once, so that their replies follow one another."""
 
-_READS, _OUTLIERS = 20, 2
-"""Reads that are timed, and how many of the longest are left to the tester's own machine."""
+_REPLIES, _TIMED_S = 510, 15.0
+"""Replies that are timed, as far as a slow line has so much time: one late reply of 500 is among them."""
+
+_FORGIVEN, _PASSES = 1, 3
+"""The late replies that are left to a real tester's machine; with more, all is timed again: the table's come again."""
 
 
 @case("2.1/1", PACING)
@@ -34,14 +42,16 @@ def there_is_no_flow_control(rig: Rig) -> None:
     rig.read()
 
 
-@case("2.2/1")
+@case("2.2/1", travel_deg=2)
 def a_reply_begins_soon(rig: Rig) -> None:
-    """Time 20 reads, from the end of the command to the first byte of the reply; all but two must be quick."""
-    delays_s = []
-    for _ in range(_READS):
-        sent_s = rig.wire.send(b"H\r")
-        delays_s.append(rig.reply_to(b"H").first_s - sent_s - 3 * rig.profile.byte_s)
-    _measure_longest(rig, "longest wait for a reply", delays_s)
+    """Time 510 replies of every kind, at rest and in motion, from the end of the command to the reply's first byte."""
+    lines = _every_kind(rig)
+
+    def delay_s(line: bytes) -> float:
+        sent_s = rig.wire.send(line + b"\r")
+        return rig.reply_to(line).first_s - sent_s - (len(line) + 2) * rig.profile.byte_s
+
+    _measure_longest(rig, "wait for a reply", lambda: [delay_s(line) for line in _lines_to_time(rig, lines, _REPLIES)])
 
 
 @case("2.2/2", travel_deg=20)
@@ -58,10 +68,17 @@ def a_reply_does_not_wait_for_a_motion(rig: Rig) -> None:
     rig.finish()
 
 
-@case("2.2/3")
+@case("2.2/3", travel_deg=2)
 def the_bytes_of_a_reply_come_without_gaps(rig: Rig) -> None:
-    """Time the longest gap between two bytes in each of 20 replies; all but two must be short."""
-    _measure_longest(rig, "longest gap in a reply", [_idle_s(rig) for _ in range(_READS)])
+    """Time the longest gap between two bytes in each of 170 replies of every kind, at rest and in motion."""
+    lines = _every_kind(rig)
+
+    def idle_s(line: bytes) -> float:
+        return max(rig.ask(line).gap_s - rig.profile.byte_s, 0.0)
+
+    _measure_longest(
+        rig, "gap in a reply", lambda: [idle_s(line) for line in _lines_to_time(rig, lines, _REPLIES // 3)]
+    )
 
 
 @case("2.3/1")
@@ -100,14 +117,31 @@ def lines_after_a_flood_are_read(rig: Rig) -> None:
     rig.read(b"L")
 
 
-def _measure_longest(rig: Rig, name: str, times_s: list[float]) -> None:
-    longest_s = sorted(times_s)[-1 - _OUTLIERS]
-    rig.measure(f"{name}, but for {_OUTLIERS}", 1000 * longest_s, "ms", most=10 + 1000 * rig.profile.serial.latency_s)
+def _every_kind(rig: Rig) -> tuple[bytes, ...]:
+    """Return lines that have every kind of reply, and move the table to and fro by a degree."""
+    home, allowed = rig.home_deg, rig.profile.motion
+    settings = (b"S " + number(allowed.speed_deg_s), b"A " + number(allowed.acceleration_deg_s2))
+    refused = (b"?", b"R x", b"S 0", b"\x18") if rig.profile.serial.error_replies else ()
+    return (b"H", b"L", *settings, b"P %d" % (home + 1), b"H", b"R 0.5", b"L", b"P %d" % home, b"R 0", *refused)
 
 
-def _idle_s(rig: Rig) -> float:
-    """Return the longest time in a reply in which the line was idle."""
-    return max(rig.ask(b"H").gap_s - rig.profile.byte_s, 0.0)
+def _lines_to_time(rig: Rig, lines: Sequence[bytes], count: int) -> Iterable[bytes]:
+    """Return so many lines, by turns, or as many as a slow line has the time for."""
+    return islice(cycle(lines), max(len(lines), min(count, int(_TIMED_S / rig.reading_s))))
+
+
+def _measure_longest(rig: Rig, name: str, measured: Callable[[], list[float]]) -> None:
+    """Measure the longest time; on a real line it may be the tester's own machine that is late once."""
+    allowed_s = 0.01 + rig.profile.serial.latency_s
+    forgiven = 0 if is_simulated(rig.wire.port.inner) else _FORGIVEN
+    for _ in range(_PASSES):
+        times_s = sorted(measured())
+        if times_s[-1 - forgiven] <= allowed_s:
+            break
+    but_for = f", but for {forgiven}" if forgiven else ""
+    rig.measure(
+        f"longest {name} of {len(times_s)}{but_for}", 1000 * times_s[-1 - forgiven], "ms", most=1000 * allowed_s
+    )
 
 
 def _bits_a_byte(rig: Rig) -> float:

@@ -47,7 +47,7 @@ def s_leaves_the_running_motion_alone(rig: Rig) -> None:
 def an_impossible_speed_is_refused(rig: Rig) -> None:
     """Set S to 0, below 0 and above the limit; the limit itself is accepted."""
     limit = rig.profile.limits.speed_deg_s
-    for text in (b"0", b"-0", b"0.0", b"-1", number(limit + 0.1), number(limit + 1000)):
+    for text in (b"0", b"-0", b"0.0", b"-0.5", b"-1", number(limit + 0.1), number(limit + 1000)):
         rig.refused(b"S " + text, _OUT_OF_RANGE)
     rig.expect(b"S " + number(limit))
 
@@ -94,7 +94,7 @@ def a_leaves_the_running_motion_alone(rig: Rig) -> None:
 def an_impossible_acceleration_is_refused(rig: Rig) -> None:
     """Set A to 0, below 0 and above the limit; the limit itself is accepted."""
     limit = rig.profile.limits.acceleration_deg_s2
-    for text in (b"0", b"-0", b"0.0", b"-1", number(limit + 0.1), number(limit + 1000)):
+    for text in (b"0", b"-0", b"0.0", b"-0.5", b"-1", number(limit + 0.1), number(limit + 1000)):
         rig.refused(b"A " + text, _OUT_OF_RANGE)
     rig.expect(b"A " + number(limit))
 

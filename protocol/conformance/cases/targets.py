@@ -1,11 +1,21 @@
 """Chapters 4.4 and 4.5: `P` and `R` give the table a target."""
 
+from math import ceil, floor, sqrt
+
 from protocol.conformance.case import case
 from protocol.conformance.rig import Rig
 from protocol.conformance.stand import PRESET
 from protocol.conformance.verdict import require
 from protocol.conformance.wire_checks import number
 from protocol.messages import ErrorCode
+
+_LITTLE_DEG = 0.00049
+"""Nothing, when it is rounded to thousandths, or to counts of an encoder with less than 1000 to the degree."""
+_LITTLE_S = 30.0
+"""For so long they are sent at most."""
+_PAUSE_S = 0.1
+_MARGIN_S = 0.002
+"""A controller's ticks, by which a little motion may take longer."""
 
 _OUT_OF_RANGE = ErrorCode.OUT_OF_RANGE
 
@@ -22,7 +32,8 @@ def p_never_takes_the_short_way(rig: Rig) -> None:
 def a_position_beyond_the_counter_is_refused(rig: Rig) -> None:
     """Command positions just beyond both ends of the counter's range."""
     with rig.unmoved(b"a position beyond the counter"):
-        for target in (rig.profile.range_deg + 0.001, 2 * rig.profile.range_deg, -rig.profile.range_deg - 0.1):
+        range_deg = rig.profile.range_deg
+        for target in (range_deg + 0.001, 2 * range_deg, 2 * range_deg + 5, -range_deg - 0.1, -2 * range_deg - 5):
             rig.refused(b"P " + number(target), _OUT_OF_RANGE)
 
 
@@ -33,6 +44,18 @@ def a_motion_beyond_half_the_counter_is_refused(rig: Rig) -> None:
     rig.stand.preset(round(far_deg * rig.profile.table.counts_per_deg))
     with rig.unmoved(b"a motion beyond half the counter"):
         rig.refused(b"P " + number(-far_deg), _OUT_OF_RANGE)
+
+
+@case("4.4/3:half", PRESET, travel_deg=2)
+def a_motion_of_half_the_counter_is_accepted(rig: Rig) -> None:
+    """From 0, move to the counter's lower end, which is half its range away, and stop; from 1 deg above, be refused."""
+    lowest = b"P -" + _within_range(rig)
+    rig.stand.preset(0)
+    rig.stand_afresh_at(0)
+    rig.begin_far_motion(lowest)
+    rig.stand.preset(ceil(1.1 * rig.profile.table.counts_per_deg))
+    with rig.unmoved(b"a motion just beyond half the counter"):
+        rig.refused(lowest, _OUT_OF_RANGE)
 
 
 @case("4.4/4", travel_deg=10)
@@ -56,12 +79,18 @@ def an_increment_in_motion_is_from_the_present_reference(rig: Rig) -> None:
 
 @case("4.5/2", travel_deg=4)
 def increments_add_up(rig: Rig) -> None:
-    """Move by a small increment ten times, waiting for rest in between."""
+    """Move by a third of a degree ten times, each time to the end, and by less than half a thousandth very often."""
     for _ in range(10):
         rig.move_by(0.3333)
         rig.follow()
-        rig.wait_for_rest()
+        rig.wire.clock.sleep_s(_PAUSE_S)
     rig.finish("ten increments")
+    start_deg, count = 10 * 0.3333 + rig.home_deg, _little_increments(rig)
+    for _ in range(count):
+        rig.expect(b"R %f" % _LITTLE_DEG)
+        rig.wire.clock.sleep_s(2 * sqrt(_LITTLE_DEG / rig.rate_deg_s2) + _MARGIN_S)
+    moved_deg = float(rig.wait_for_rest()) - start_deg
+    rig.measure(f"{count} times {_LITTLE_DEG:f}", moved_deg, "deg", *rig.near(count * _LITTLE_DEG))
 
 
 @case("4.5/3", travel_deg=30)
@@ -87,5 +116,25 @@ def r_0_at_rest_moves_nothing(rig: Rig) -> None:
 def an_increment_beyond_half_the_counter_is_refused(rig: Rig) -> None:
     """Command increments just beyond half the counter's range."""
     with rig.unmoved(b"an increment beyond half the counter"):
-        for way in (rig.profile.range_deg + 0.1, -rig.profile.range_deg - 0.1):
+        for way in (rig.profile.range_deg + 0.1, -rig.profile.range_deg - 0.1, 2 * rig.profile.range_deg + 5):
             rig.refused(b"R " + number(way), _OUT_OF_RANGE)
+
+
+@case("4.5/5:half", PRESET, travel_deg=2)
+def an_increment_of_half_the_counter_is_accepted(rig: Rig) -> None:
+    """Move by half the counter's range, both ways, and stop."""
+    for sign in (b"-", b""):
+        rig.stand.preset(0)
+        rig.stand_afresh_at(0)
+        rig.begin_far_motion(b"R " + sign + _within_range(rig))
+
+
+def _within_range(rig: Rig) -> bytes:
+    """Return the greatest whole number within half the counter's range; on the default table it is just that half."""
+    return b"%d" % floor(rig.profile.range_deg)
+
+
+def _little_increments(rig: Rig) -> int:
+    """Return how many little increments show that one is lost, as far as a slow line has the time."""
+    least, most = rig.near(0)
+    return min(ceil((most - least) / _LITTLE_DEG), int(_LITTLE_S / rig.reading_s))

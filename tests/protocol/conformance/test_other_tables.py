@@ -69,6 +69,7 @@ def test_what_such_a_table_lacks_is_said(tmp_path: Path) -> None:
         "lacks a trigger input that the rig can drive",
         "lacks a way to switch the table off and on",
         "lacks a way to preset the position counter",
+        "lacks a view of the encoder beside the wire",
         "lacks a table that sees its client go",
         "lacks error replies",
     }

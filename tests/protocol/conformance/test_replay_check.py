@@ -144,7 +144,7 @@ def test_the_kits_own_record_fits(tmp_path: Path) -> None:
     from protocol.conformance.__main__ import main  # noqa: PLC0415 - for this test alone
     from protocol.conformance.record import read_record  # noqa: PLC0415
 
-    cases = ("2.3", "3", "4.2", "4.5", "4.6", "5", "6", "7.3", "8")
+    cases = ("2.3", "3", "4.2", "4.5/1", "4.5/2", "4.5/3", "4.5/4", "4.6", "5", "6", "7.3", "8")
     words = [word for case in cases for word in ("--case", case)]
     assert main(["--port", "emulator://", *words, "--out", str(tmp_path)]) == 0
     record = read_record(tmp_path / "record.json")

@@ -59,6 +59,13 @@ def test_other_settings_of_the_line_conform_too(query: str, serial_keys: str, tm
     assert bad == []
 
 
+def test_a_table_in_process_is_asked_for_its_own_range(tmp_path: Path) -> None:
+    file = tmp_path / "coarse.toml"
+    file.write_text("[encoder]\nlines = 48\n")  # half as many as the profile's table has
+    outcomes = run(f"emulator://?config={file}", load_profile(), ["4.4/2", "4.4/3", "6.1/2"])
+    assert [outcome.reason for outcome in outcomes if outcome.verdict is not Verdict.PASS] == []
+
+
 def test_the_same_seed_gives_the_same_bytes_at_the_same_times() -> None:
     first, second = (run("emulator://", load_profile(), ["7.3/7"], seed=5) for _ in range(2))
     assert [outcome.wire for outcome in first] == [outcome.wire for outcome in second]

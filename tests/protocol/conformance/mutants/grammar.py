@@ -4,7 +4,7 @@ import re
 from decimal import Decimal
 
 from protocol.messages import Command, ErrorCode, Verb
-from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by, value_of, verb_of
+from tests.protocol.conformance.mutants.mutant import Line, Mutant, RereadsLines, caught_by, value_of, verb_of
 
 
 @caught_by("4.1/1")
@@ -126,3 +126,33 @@ class BusyInMotion(Mutant):
     def _reply(self, command: Line) -> bytes:
         busy = self.moving and verb_of(command) in {Verb.SET_SPEED, Verb.SET_ACCELERATION}
         return super()._reply(ErrorCode.OUT_OF_RANGE if busy else command)
+
+
+def seventh_letter(line: bytes) -> None:
+    class SeventhLetter(Mutant):
+        __doc__ = f"{line.decode()} is a command"
+
+        def _answer(self, got: bytes | ErrorCode) -> bytes:
+            return b"OK\r" if got == line else super()._answer(got)
+
+    caught_by("4.1/1")(SeventhLetter)
+
+
+for each in (b"V", b"B", b"Z", b"V 1", b"v", b"s 1", b"7", b"#", b"*IDN?"):
+    seventh_letter(each)
+
+
+@caught_by("4.1/3")
+class KnowsHome(RereadsLines):
+    """HOME is read as H"""
+
+    def instead_of(self, line: bytes) -> bytes:
+        return b"H" if line == b"HOME" else line
+
+
+@caught_by("4.1/4")
+class KnowsStop(RereadsLines):
+    """STOP is read as R 0"""
+
+    def instead_of(self, line: bytes) -> bytes:
+        return b"R 0" if line == b"STOP" else line

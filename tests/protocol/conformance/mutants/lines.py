@@ -1,6 +1,7 @@
 """Wrong tables: the serial line, and from bytes to lines."""
 
 import re
+from collections.abc import Callable
 
 from emulator.config import TableConfig
 from emulator.faults import fault_from
@@ -126,16 +127,20 @@ class ComputesInMidReply(Mutant):
 
     unsent, next_tick = b"", 0
 
-    def ticks_until_byte(self) -> int | None:
-        return 1 if self.unsent else super().ticks_until_byte()
+    def ticks_until_sent(self, wanted: int) -> int | None:
+        return 1 if self.unsent else super().ticks_until_sent(wanted)
 
     def transmit(self) -> bytes:
         self.unsent += super().transmit()
         if self.tick < self.next_tick:
             return b""
         byte, self.unsent = self.unsent[:1], self.unsent[1:]
-        self.next_tick = self.tick + 30 * byte.count(b"H")
+        self.next_tick = self.tick + self.pause_ticks(byte)
         return byte
+
+    def pause_ticks(self, byte: bytes) -> int:
+        """Return how long it waits after a byte."""
+        return 30 * byte.count(b"H")
 
 
 class ForgivingBuffer(LineBuffer):
@@ -195,3 +200,99 @@ class LongLinesDrag(Mutant):
         reply = super()._reply(ErrorCode.BAD_BYTE if self.spoiled else command)
         self.spoiled = command is ErrorCode.LINE_TOO_LONG
         return reply
+
+
+def forgets_half_lines(after_s: float) -> None:
+    class ForgetsHalfLines(Mutant):
+        __doc__ = f"a half line is forgotten after {after_s:g} s of silence"
+
+        last_tick = 0
+
+        def receive(self, data: bytes) -> None:
+            if self.tick - self.last_tick > 1000 * after_s:
+                self._serial._lines.discard()  # noqa: SLF001 - a wrong table reaches into itself
+            self.last_tick = self.tick
+            super().receive(data)
+
+    caught_by("3.1/4")(ForgetsHalfLines)
+
+
+for each_s in (0.1, 1.0, 5.0):
+    forgets_half_lines(each_s)
+
+
+@caught_by("3.1/4")
+class SilenceEndsALine(Mutant):
+    """a half line is carried out after 2 s of silence"""
+
+    last_tick, is_half = 0, False
+
+    def receive(self, data: bytes) -> None:
+        super().receive(data)
+        self.last_tick, self.is_half = self.tick, not data.endswith((b"\r", b"\n"))
+
+    def ticks_until_sent(self, wanted: int) -> int | None:
+        return 1 if self.is_half else super().ticks_until_sent(wanted)
+
+    def advance(self, ticks: int) -> None:
+        super().advance(ticks)
+        if self.is_half and self.tick - self.last_tick > 2000:
+            self.receive(b"\r")
+
+
+@caught_by("3.1/2")
+class SkipsWhatFollowsCr(Mutant):
+    """after CR it waits for LF or for the next CR where LF has come before"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(re.sub(rb"\r\n[^\r]*(?=\r)", b"\r", data))
+
+
+def late(name: str, is_late: Callable[[bytes, int], bool], late_s: float = 0.025) -> None:
+    class Late(Mutant):
+        __doc__ = f"{name} comes {1000 * late_s:g} ms late"
+
+        replies = 0
+
+        def _answer(self, line: bytes | ErrorCode) -> bytes:
+            reply = super()._answer(line)
+            self.replies += 1
+            if is_late(reply, self.replies):
+                self.inject(fault_from("late-reply", {"seconds": late_s}))
+            return reply
+
+    caught_by("2.2/1")(Late)
+
+
+def every(nth: int) -> Callable[[bytes, int], bool]:
+    return lambda _, count: count % nth == 0
+
+
+late("OK", lambda reply, _: reply == b"OK\r")
+late("L", lambda reply, _: reply.startswith(b"L"))
+late("a refusal", lambda reply, _: reply.startswith(b"ERR"))
+late("the refusal of a number", lambda reply, _: reply.startswith(b"ERR 3"))
+for nth in (20, 50, 200, 500):
+    late(f"every {nth}th reply", every(nth), 0.03)
+
+
+@caught_by("2.2/1")
+class LateInMotion(Mutant):
+    """in motion a reply comes 25 ms late"""
+
+    def _answer(self, line: bytes | ErrorCode) -> bytes:
+        reply = super()._answer(line)
+        if self.moving:
+            self.inject(fault_from("late-reply", {"seconds": 0.025}))
+        return reply
+
+
+@caught_by("2.2/3")
+class StumblesAtTimes(ComputesInMidReply):
+    """in every 50th reply it pauses for 30 ms"""
+
+    replies = 0
+
+    def pause_ticks(self, byte: bytes) -> int:
+        self.replies += byte == b"\r"
+        return 30 * (byte != b"\r" and self.replies % 50 == 49)

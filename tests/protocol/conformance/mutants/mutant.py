@@ -67,6 +67,30 @@ class Mutant(Table):
         self._state = self._state._replace(firmware=stepped)
 
 
+class RereadsLines(Mutant):
+    """Takes a line for another one."""
+
+    def instead_of(self, line: bytes) -> bytes:
+        raise NotImplementedError
+
+    def _answer(self, line: bytes | ErrorCode) -> bytes:
+        return super()._answer(line if isinstance(line, ErrorCode) else self.instead_of(line))
+
+
+class RereadsNumbers(Mutant):
+    """Takes the number of some commands for another one."""
+
+    verbs = frozenset({Verb.MOVE_TO, Verb.MOVE_BY, Verb.SET_SPEED, Verb.SET_ACCELERATION})
+
+    def number_instead_of(self, value: Decimal) -> Decimal:
+        raise NotImplementedError
+
+    def _reply(self, command: Line) -> bytes:
+        if isinstance(command, Command) and command.value is not None and command.verb in self.verbs:
+            command = Command(command.verb, self.number_instead_of(command.value))
+        return super()._reply(command)
+
+
 class Rereads(Mutant):
     """Carries a motion command out as another one, or says `OK` and passes it over."""
 

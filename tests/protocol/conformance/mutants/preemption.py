@@ -1,5 +1,6 @@
 """Wrong tables: a motion that replaces another."""
 
+from emulator.fixed_point import SPEED_BITS
 from protocol.messages import Command, Verb
 from tests.protocol.conformance.mutants.mutant import MOTIONS, Line, Mutant, Rereads, caught_by, value_of, verb_of
 
@@ -163,3 +164,22 @@ class KeepsAHigherAcceleration(KeepsTheOld):
 
     def kept(self, speed: int, acceleration: int) -> tuple[int, int]:  # noqa: ARG002 - that is new
         return self._registers.speed, max(acceleration, self._registers.acceleration)
+
+
+class StartsFromTheMotor(Rereads):
+    """Starts a motion that replaces another from what was measured of the motor."""
+
+    def start_from(self, speed: int) -> None:
+        self.step_to(speed)
+
+    def instead(self, command: Command) -> Command:
+        if self.moving:
+            controller = self._state.firmware
+            window_ticks = self.config.control.speed_window_ticks
+            self.start_from((controller.pid.measured << SPEED_BITS) // window_ticks)
+        return command
+
+
+@caught_by("7.3/2:accelerating")
+class StartsFromTheMeasuredSpeed(StartsFromTheMotor):
+    """a motion that replaces another starts from the measured speed"""

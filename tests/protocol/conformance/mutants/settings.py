@@ -149,3 +149,24 @@ class CutsToItsLimit(Mutant):
         if isinstance(command, Command) and command.verb is Verb.SET_ACCELERATION:
             command = Command(command.verb, min(value_of(command), Decimal(100)))
         return super()._reply(command)
+
+
+class LostInMotion(Mutant):
+    """Says `OK` to a setting that comes in a motion, and keeps the old one."""
+
+    verb = Verb.SET_SPEED
+
+    def _reply(self, command: Line) -> bytes:
+        return b"OK\r" if self.moving and verb_of(command) is self.verb else super()._reply(command)
+
+
+@caught_by("4.1/11:random")
+class SpeedIsLostInMotion(LostInMotion):
+    """S is lost in a motion"""
+
+
+@caught_by("4.1/11:random")
+class AccelerationIsLostInMotion(LostInMotion):
+    """A is lost in a motion"""
+
+    verb = Verb.SET_ACCELERATION

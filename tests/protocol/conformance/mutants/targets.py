@@ -40,8 +40,8 @@ class OkIsArrival(Mutant):
             reply, self.held = b"", reply
         return reply
 
-    def ticks_until_byte(self) -> int | None:
-        return 1 if self.held else super().ticks_until_byte()
+    def ticks_until_sent(self, wanted: int) -> int | None:
+        return 1 if self.held else super().ticks_until_sent(wanted)
 
     def advance(self, ticks: int) -> None:
         super().advance(ticks)
@@ -144,3 +144,37 @@ class StumblesOverTheEnd(Mutant):
         super().advance(ticks)
         if abs(self._state.firmware.reference.position_count - before) > 2**31:
             self.step_to(0)
+
+
+def refuses_half(verb: Verb, way: str, case: str) -> None:
+    class RefusesHalf(Rereads):
+        __doc__ = f"{verb} {way} is refused, though it is half the counter's range"
+
+        def instead(self, command: Command) -> Command:
+            far = command.verb is verb and value_of(command) == Decimal(way)
+            return Command(verb, Decimal(2**40)) if far else command
+
+    caught_by(case)(RefusesHalf)
+
+
+refuses_half(Verb.MOVE_TO, "-4194304", "4.4/3:half")
+refuses_half(Verb.MOVE_BY, "-4194304", "4.5/5:half")
+refuses_half(Verb.MOVE_BY, "4194304", "4.5/5:half")
+
+
+@caught_by("4.4/3:half")
+class TakesMoreThanHalf(Rereads):
+    """a motion a little longer than half the counter's range is accepted, and begun"""
+
+    def instead(self, command: Command) -> Command:
+        too_far = command.verb is Verb.MOVE_TO and value_of(command) == -(2**22) and self.target() > 0
+        return Command(Verb.MOVE_BY, Decimal(-(2**22))) if too_far else command
+
+
+@caught_by("4.5/5:half")
+class HalfIsBackwards(Rereads):
+    """an increment of half the counter's range turns the other way"""
+
+    def instead(self, command: Command) -> Command:
+        half = command.verb is Verb.MOVE_BY and value_of(command) == 2**22
+        return Command(Verb.MOVE_BY, Decimal(-(2**22))) if half else command
