@@ -18,7 +18,7 @@ from protocol.conformance.verdict import NonconformityError
 from protocol.conformance.walk_machine import RandomWalk
 from protocol.conformance.wire import RecordedPort, Wire
 
-_ON_A_PORT, _SIMULATED = (4, 12), (12, 20)
+ON_A_PORT, SIMULATED = (4, 12), (12, 20)
 """Walks, and steps of each: a table that is moved for it is moved little."""
 _STAND_IN_URL = "emulator://"
 
@@ -35,10 +35,10 @@ def walk(rig: Rig) -> None:
     """
     chance = rig.chance.randrange(2**32)
     if is_simulated(rig.wire.port.inner):
-        _search_and_shrink(rig, chance, _SIMULATED)
+        _search_and_shrink(rig, chance, SIMULATED)
         return
     try:
-        _search(rig, chance, _ON_A_PORT, _FoundError)
+        search(rig, chance, ON_A_PORT, _FoundError)
     except _FoundError as found:
         raise NonconformityError(f"{found}; {_on_the_stand_in(rig, chance)}") from None
 
@@ -52,7 +52,7 @@ def _on_the_stand_in(rig: Rig, chance: int) -> str:
     stand = stand_beside(port, None, rig.profile)
     twin = Rig(Wire(RecordedPort(port), rig.profile.byte_s), rig.profile, stand, 0, Random(0))  # noqa: S311  # not used
     try:
-        _search_and_shrink(twin, chance, _ON_A_PORT)
+        _search_and_shrink(twin, chance, ON_A_PORT)
     except NonconformityError as error:
         return f"on the stand-in too: {error}"
     finally:
@@ -69,16 +69,17 @@ def _search_and_shrink(rig: Rig, chance: int, size: tuple[int, int]) -> None:
         return NonconformityError(message)
 
     try:
-        _search(rig, chance, size, failure, Phase.shrink)
+        search(rig, chance, size, failure, Phase.shrink)
     except (NonconformityError, HypothesisException):
         if not failures:
             raise
         raise NonconformityError(min(reversed(failures), key=lambda message: message.count(", "))) from None
 
 
-def _search(
+def search(
     rig: Rig, chance: int, size: tuple[int, int], failure: Callable[[str], BaseException], *phases: Phase
 ) -> None:
+    """Walk so often, and so many steps each time, drawn from a seed; raise the first `failure`, or shrink it first."""
     walks, steps = size
     machine = type("RandomWalkOfOneRig", (RandomWalk,), {"rig": rig, "failure": staticmethod(failure)})
     run_state_machine_as_test(

@@ -40,6 +40,12 @@ def _tenths(least: float, most: float) -> st.SearchStrategy[float]:
     return st.integers(round(10 * least), round(10 * most)).map(lambda tenths: tenths / 10)
 
 
+_FAR = st.sampled_from((-9.0, -5.0, 5.0, 9.0))
+_SHARE = st.sampled_from((0.25, 0.5, 1.5))
+"""Of the S or A that was set, or else the change would not be seen."""
+_POLL_S = 0.03
+
+
 class RandomWalk(RuleBasedStateMachine):
     """The six commands, waits, triggers and refused lines, in any order.
 
@@ -85,6 +91,38 @@ class RandomWalk(RuleBasedStateMachine):
     def move_by(self, way: float) -> None:
         """Command R."""
         self.rig.move_by(way)
+
+    @rule(angle=_FAR, seconds=_tenths(0.1, 0.3), share=_SHARE, preempts=st.booleans())
+    @_step
+    def set_speed_in_motion(self, angle: float, seconds: float, share: float, preempts: bool) -> None:
+        """Set S in a motion: that goes on, and the next one has it."""
+        allowed = self.rig.profile.motion
+        self.rig.settings(min(10, allowed.speed_deg_s), min(60, allowed.acceleration_deg_s2))
+        self._in_motion(angle, seconds, lambda: self.rig.set_speed(self.rig.top_deg_s * share), preempts)
+
+    @rule(angle=_FAR, seconds=_tenths(0.1, 0.3), share=_SHARE, preempts=st.booleans())
+    @_step
+    def set_acceleration_in_motion(self, angle: float, seconds: float, share: float, preempts: bool) -> None:
+        """Set A in a motion: that goes on, and the next one has it."""
+        allowed = self.rig.profile.motion
+        self.rig.settings(min(20, allowed.speed_deg_s), min(40, allowed.acceleration_deg_s2))
+        self._in_motion(angle, seconds, lambda: self.rig.set_acceleration(self.rig.rate_deg_s2 * share), preempts)
+
+    def _in_motion(self, angle: float, seconds: float, change: Callable[[], None], preempts: bool) -> None:
+        """Begin a motion, change a setting in it, and begin the next one, in the motion or after it."""
+        self.rig.move_to(angle)
+        self._sample_for(seconds)
+        change()
+        self._sample_for(0.1)
+        if not preempts:
+            self.rig.wire.clock.sleep_s(self._left_s())
+        self.rig.move_to(-angle)
+        self._sample_for(0.5)
+
+    def _left_s(self) -> float:
+        """Return how long the motion still takes."""
+        last = self.rig.motion.expectations[-1]
+        return max(0.0, last.began_s + last.motion.duration_s - self.rig.wire.clock.now_s())
 
     @rule(seconds=_tenths(0, 0.5))
     @_step
@@ -157,6 +195,12 @@ class RandomWalk(RuleBasedStateMachine):
 
     def teardown(self) -> None:
         """Leave the table at rest; a failure has been told already."""
+
+    def _sample_for(self, seconds: float) -> None:
+        until_s = self.rig.wire.clock.now_s() + seconds
+        while self.rig.wire.clock.now_s() < until_s:
+            self._sample()
+            self.rig.wire.clock.sleep_s(_POLL_S)
 
     def _sample(self) -> float:
         sample = self.rig.sample()

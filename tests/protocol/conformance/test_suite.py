@@ -14,7 +14,7 @@ from emulator.protocol_emulator import Serial
 from protocol.conformance.catalogue import all_cases, chosen_cases
 from protocol.conformance.ports import SessionError
 from protocol.conformance.profile import Profile, load_profile
-from protocol.conformance.random_walk import walk
+from protocol.conformance.random_walk import SIMULATED, search, walk
 from protocol.conformance.rig import Rig
 from protocol.conformance.stand import InProcess, WireOnly, stand_beside
 from protocol.conformance.suite import Outcome, Session
@@ -236,6 +236,13 @@ def test_a_random_walk_finds_what_is_wrong_and_shrinks_it(wrong: str) -> None:
     found = first_failure([rig_on(port_to(MUTANTS[wrong][1]), seed) for seed in range(6)])
     steps = found.partition("; after ")[2].split(", ")
     assert 1 <= len(steps) <= 6, found
+
+
+@pytest.mark.parametrize("wrong", ["S is lost in a motion", "A is lost in a motion"])
+def test_every_random_walk_finds_a_setting_that_is_lost_in_a_motion(wrong: str) -> None:
+    for seed in range(8):
+        with pytest.raises(NonconformityError):
+            search(rig_on(port_to(MUTANTS[wrong][1]), seed), seed, SIMULATED, NonconformityError)
 
 
 def test_on_a_real_table_a_failing_walk_is_not_repeated_but_shrunk_on_the_stand_in() -> None:
