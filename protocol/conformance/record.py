@@ -122,21 +122,20 @@ def read_record(path: Path) -> Record:
         raise RecordError(f"{path}: is damaged: {type(error).__name__} {error}") from error
 
 
-def write_junit(path: Path, header: Header, outcomes: Sequence[Outcome]) -> None:
-    """Write the verdicts as JUnit's XML; it appears under its name when it is whole."""
+def write_junit(path: Path, header: Header, outcomes: Sequence[Outcome], durations_s: Sequence[float]) -> None:
+    """Write the verdicts as JUnit's XML, with the real duration of each case; it appears under its name when whole."""
     counts = count_verdicts(outcomes)
     numbers = {"tests": len(outcomes), "failures": counts.get(Verdict.FAIL, 0), "errors": counts.get(Verdict.ERROR, 0)}
-    seconds = sum(outcome.seconds for outcome in outcomes)
     suite = ET.Element(
         "testsuite",
-        {"name": f"conformance of {header.device}", "time": f"{seconds:.3f}"}
+        {"name": f"conformance of {header.device}", "time": f"{sum(durations_s):.3f}"}
         | {key: str(value) for key, value in numbers.items()}
         | {"skipped": str(counts.get(Verdict.SKIPPED, 0))},
     )
-    for outcome in outcomes:
+    for outcome, duration_s in zip(outcomes, durations_s, strict=True):
         name = f"{outcome.case.id} {outcome.case.run.__name__}"
         section = outcome.case.clause.number.partition("/")[0]
-        attributes = {"classname": f"protocol.conformance.{section}", "name": name, "time": f"{outcome.seconds:.3f}"}
+        attributes = {"classname": f"protocol.conformance.{section}", "name": name, "time": f"{duration_s:.3f}"}
         element = ET.SubElement(suite, "testcase", attributes)
         tag = {Verdict.FAIL: "failure", Verdict.ERROR: "error", Verdict.SKIPPED: "skipped"}.get(outcome.verdict)
         if tag:

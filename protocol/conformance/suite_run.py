@@ -8,6 +8,7 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 
+from protocol.clock import WallClock
 from protocol.conformance.case import Case
 from protocol.conformance.catalogue import only
 from protocol.conformance.command_line import UsageError, confirm, say, show_progress, tell
@@ -38,20 +39,26 @@ def run_suite(options: argparse.Namespace, profile: Profile, port: ReopenablePor
     confirm(options.port, options.yes, profile, port)
     begun = None if is_simulated(port) else datetime.now().astimezone().isoformat(timespec="seconds")
     outcomes: list[Outcome] = []
+    durations_s: list[float] = []
     status = 0
     with watch_in(simulated=is_simulated(port)) as watch:
         stand = stand_beside(port, options.control, profile)
         session = session_at(options.port, RecordedPort(port), profile, stand, options.seed, watch)
         header = Header(
-            described(options.port), profile, options.seed, session.home_deg, sorted(session.capabilities), begun
+            described(options.port),
+            session.profile,
+            options.seed,
+            session.home_deg,
+            sorted(session.capabilities),
+            begun,
         )
         try:
-            session.run(cases, _progress(outcomes, len(cases), options))
+            session.run(cases, _progress(outcomes, durations_s, len(cases), options))
         except KeyboardInterrupt as interrupt:
             status = status_after(interrupt)
             say(f"interrupted after {len(outcomes)} of {len(cases)} cases; {session.how_it_was_left}")
     tell(", ".join(f"{count} {verdict}" for verdict, count in count_verdicts(outcomes).items()) or "nothing was run")
-    written = _write(options, header, outcomes, junit)
+    written = _write(options, header, outcomes, durations_s, junit)
     return status or (int(any(outcome.verdict in _BAD for outcome in outcomes)) if written else _NO_FILES)
 
 
@@ -72,12 +79,14 @@ def _junit_file(options: argparse.Namespace) -> Path:
     return junit
 
 
-def _write(options: argparse.Namespace, header: Header, outcomes: Sequence[Outcome], junit: Path) -> bool:
+def _write(
+    options: argparse.Namespace, header: Header, outcomes: Sequence[Outcome], durations_s: Sequence[float], junit: Path
+) -> bool:
     """Write the files, and return whether all could be; one that cannot takes none of the others with it."""
     report = options.out / "report.html"
     writers = (
         partial(write_record, options.out / "record.json", header, outcomes),
-        partial(write_junit, junit, header, outcomes),
+        partial(write_junit, junit, header, outcomes, durations_s),
         partial(write_report, report, header, outcomes, partial(_repeat, options)),
     )
     done = [_is_done(write) for write in writers]
@@ -95,11 +104,22 @@ def _is_done(write: Callable[[], None]) -> bool:
     return True
 
 
-def _progress(outcomes: list[Outcome], total: int, options: argparse.Namespace) -> Callable[[Outcome], None]:
-    """Return what takes in each outcome: it prints those worth reading, and on a terminal shows how far the run is."""
+def _progress(
+    outcomes: list[Outcome], durations_s: list[float], total: int, options: argparse.Namespace
+) -> Callable[[Outcome], None]:
+    """Return what takes in each outcome: it prints those worth reading, and on a terminal shows how far the run is.
+
+    How long a case took in real time, which is another than a simulated table's, is kept apart from its outcome.
+    """
+    clock = WallClock()
+    last_s = clock.now_s()
 
     def take(outcome: Outcome) -> None:
+        nonlocal last_s
+        now_s = clock.now_s()
         outcomes.append(outcome)
+        durations_s.append(now_s - last_s)
+        last_s = now_s
         show_progress("")
         for run in outcome.spoiled:
             say(f"{outcome.case.id} was run again, since {run}")

@@ -46,12 +46,13 @@ def session(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactor
 
 @pytest.mark.parametrize("case", all_cases(), ids=lambda case: case.id)
 def test_clause(
-    session: Session, case: Case, record_property: Callable[[str, object], None], pytestconfig: pytest.Config
+    session: Session, case: Case, record_testsuite_property: Callable[[str, object], None], pytestconfig: pytest.Config
 ) -> None:
     """Hold the table against one clause."""
     outcome = session.run_case(case)
     for measurement in outcome.measurements:
-        record_property(measurement.name, f"{measurement} {measurement.verdict}")
+        # Of the suite, as xunit2 has it: there a single test has no properties.
+        record_testsuite_property(f"{case.id}: {measurement.name}", f"{measurement} {measurement.verdict}")
     if outcome.verdict is Verdict.SKIPPED:
         pytest.skip(outcome.reason)
     if outcome.verdict in {Verdict.FAIL, Verdict.ERROR}:

@@ -1,5 +1,6 @@
 """The command line: records, reports, replays, exit statuses, and one clear line for what cannot be."""
 
+import itertools
 import json
 import os
 import shlex
@@ -12,6 +13,7 @@ import pytest
 
 from emulator.protocol_emulator import Serial
 from emulator.table import Table
+from protocol.conformance import suite_run
 from protocol.conformance.__main__ import main
 
 ROOT = Path(__file__).parents[3]
@@ -43,6 +45,20 @@ def test_a_run_leaves_a_record_a_report_and_junit(out: Path, capsys: pytest.Capt
     assert "<svg" in report
     assert "http" not in report  # one file, which asks for nothing
     assert sorted(path.name for path in out.iterdir()) == ["junit.xml", "record.json", "report.html"]
+
+
+def test_junit_gives_the_real_seconds_of_a_simulated_table(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    times_s = itertools.count(step=0.25)
+
+    class SlowClock:
+        def now_s(self) -> float:
+            return next(times_s)
+
+    monkeypatch.setattr(suite_run, "WallClock", SlowClock)
+    assert conformance("--port", "emulator://", "--case", "7.1/1", "--out", out) == 0
+    suite = ET.parse(out / "junit.xml").getroot()[0]  # noqa: S314 - our own file
+    assert (suite.get("time"), [case.get("time") for case in suite]) == ("0.500", ["0.250", "0.250"])
+    assert min(case["seconds"] for case in json.loads((out / "record.json").read_text())["cases"]) > 2
 
 
 def test_in_simulated_time_a_run_gives_the_same_bytes(tmp_path: Path) -> None:
@@ -193,7 +209,7 @@ def test_what_cannot_be_done_is_one_clear_line(
 @pytest.fixture
 def record(tmp_path: Path) -> Path:
     conformance(
-        "--port", "emulator://", "--case", "4.5", "--case", "5.2", "--case", "6.2", "--out", tmp_path / "recorded"
+        "--port", "emulator://", "--case", "4.5/4", "--case", "5.2", "--case", "6.2/2", "--out", tmp_path / "recorded"
     )
     return tmp_path / "recorded" / "record.json"
 

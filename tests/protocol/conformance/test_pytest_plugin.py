@@ -10,6 +10,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -87,8 +88,13 @@ def test_what_the_fixture_cannot_use_fails_the_test_in_one_line(words: list[str]
 
 
 def test_the_suite_runs_under_pytest(tmp_path: Path) -> None:
-    result = run_pytest(tmp_path, "--pyargs", "protocol.conformance", "-k", "5.3 or 5.4")
-    assert "5 passed, 2 skipped" in result.stdout, result.stdout + result.stderr
+    words = ["--pyargs", "protocol.conformance", "-k", "5.3 or 5.4 or 4.3/2", "--junitxml", "junit.xml", "-W", "error"]
+    result = run_pytest(tmp_path, *words)
+    assert "6 passed, 2 skipped" in result.stdout, result.stdout + result.stderr
+    assert "warning" not in result.stdout
+    suite = ET.parse(tmp_path / "junit.xml").getroot()[0]  # noqa: S314 - our own file
+    assert "4.3/2: latch" in {one.get("name") for one in suite.iter("property")}
+    assert not suite.findall("testcase/properties")  # which xunit2, that pytest writes, does not have
 
 
 @pytest.mark.realtime

@@ -55,7 +55,7 @@ def test_any_name_of_a_device_costs_no_record_and_no_report(tmp_path: Path, name
     header = Header(name, load_profile(), 0, 0, [], None)
     write_report(tmp_path / "report.html", header, [outcome], lambda _case: f"--port {name}")
     write_record(tmp_path / "record.json", header, [outcome])
-    write_junit(tmp_path / "junit.xml", header, [outcome])
+    write_junit(tmp_path / "junit.xml", header, [outcome], [1.5])
     suite = ET.parse(tmp_path / "junit.xml").getroot()[0]  # noqa: S314  # our own
     assert suite.attrib["name"].startswith("conformance of /dev/")
     assert (suite.attrib["failures"], len(suite)) == ("1", 1)
