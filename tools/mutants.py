@@ -1,0 +1,131 @@
+"""Random mutation of the emulated table: what does the conformance suite not find?
+
+`python -m tools.mutants --seed N --count N` changes one operator, constant, condition or statement of the table's code
+at a time, in memory, and runs the suite against that table until a case fails. It prints mutants that pass. Those that
+may pass are listed with the reason in `mutants.toml`.
+"""
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from random import Random
+from typing import NamedTuple
+
+from tools.command_line import ended
+from tools.mutation import MODULES, Mutation, mutations_of, planted
+from tools.progress import Progress
+
+EXPLAINED = Path(__file__).with_name("mutants.toml")
+_CPU_S = 120
+"""Of computing time, of which a whole run takes about 5 s: a mutant that takes so long hangs."""
+
+
+class Explanation(NamedTuple):
+    """Why mutants may come through: those of a place, or only one change there."""
+
+    where: str
+    change: str
+    reason: str
+
+    def holds_for(self, mutation: Mutation) -> bool:
+        """Return whether it is about a mutation: in this function or class, and with this change if one is named."""
+        return f"{mutation.where}.".startswith(f"{self.where}.") and self.change in {"", mutation.change}
+
+
+def explanations(file: Path = EXPLAINED) -> list[Explanation]:
+    """Return what the file says of mutants that may come through."""
+    entries = tomllib.loads(file.read_text(encoding="utf-8"))["may"]
+    return [Explanation(entry["where"], entry.get("change", ""), entry["reason"]) for entry in entries]
+
+
+def verdict_on(mutation: Mutation, seed: int) -> str:
+    """Plant a mutation in this process, and return which case fails and how, or nothing if all pass."""
+    from emulator.protocol_emulator import RUN, Serial  # noqa: PLC0415 - the mutation is planted in what is loaded
+    from protocol.conformance.catalogue import all_cases  # noqa: PLC0415
+    from protocol.conformance.profile import load_profile  # noqa: PLC0415
+    from protocol.conformance.stand import InProcess  # noqa: PLC0415
+    from protocol.conformance.suite import Session, SessionError  # noqa: PLC0415
+    from protocol.conformance.verdict import Verdict  # noqa: PLC0415
+    from protocol.conformance.wire import RecordedPort  # noqa: PLC0415
+
+    RUN.warm_up_ticks = sys.maxsize  # compiled code would be that of the table without the mutation
+    planted(mutation)
+    try:
+        port = Serial("emulator://", timeout=1)
+        session = Session(RecordedPort(port), load_profile(), InProcess(port.table), seed)
+        for case in all_cases():
+            outcome = session.run_case(case)
+            if outcome.verdict in {Verdict.FAIL, Verdict.ERROR}:
+                return f"{case.id}: {outcome.reason}"
+    except SessionError as error:
+        return f"no session: {error}"
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+    return ""
+
+
+def verdict_in_a_process(index: int, seed: int) -> str:
+    """Return the verdict on a mutation from a process of its own: it may hang or crash."""
+    command = [sys.executable, "-m", "tools.mutants", "--only", str(index), "--seed", str(seed)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        return f"status {done.returncode}: {done.stderr.strip().splitlines()[-1:]}"
+    return str(json.loads(done.stdout))
+
+
+def hunt(count: int, seed: int) -> Iterator[tuple[Mutation, str]]:
+    """Yield random mutations, each with what the suite says of it: nothing if it came through."""
+    mutations = list(enumerate(mutations_of(MODULES)))
+    chosen = Random(seed).sample(mutations, min(count, len(mutations)))  # noqa: S311 - no secret
+    with Progress("mutants") as progress:
+        for number, (index, mutation) in enumerate(chosen):
+            progress.show(number / len(chosen))
+            yield mutation, verdict_in_a_process(index, seed)
+
+
+def _run(options: argparse.Namespace) -> int:
+    if options.only is not None:
+        resource.setrlimit(resource.RLIMIT_CPU, (_CPU_S, _CPU_S))
+        print(json.dumps(verdict_on(mutations_of(MODULES)[options.only], options.seed)))
+        return 0
+    known = explanations()
+    caught = explained = 0
+    unexplained: list[Mutation] = []
+    try:
+        for mutation, verdict in hunt(options.count, options.seed):
+            reason = next((one.reason for one in known if one.holds_for(mutation)), "")
+            if verdict:
+                caught += 1
+            elif reason:
+                explained += 1
+            else:
+                unexplained.append(mutation)
+            if options.verbose or not (verdict or reason):
+                print(f"{mutation}: {verdict[:160] or reason or 'CAME THROUGH'}", flush=True)
+    finally:
+        print(f"{caught} caught, {explained} came through and may, {len(unexplained)} came through")
+    return int(bool(unexplained))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line, and return the exit status: 1 if a mutant came through without a reason."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tools.mutants", description="random mutants of the emulated table that the suite does not catch"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="random seed of the mutants and of the suite (default: 0)")
+    parser.add_argument("--count", type=int, default=60, help="number of mutants, about 5 s each (default: 60)")
+    parser.add_argument("--verbose", action="store_true", help="print caught mutants too, each with its case")
+    parser.add_argument("--only", type=int, metavar="INDEX", help=argparse.SUPPRESS)
+    options = parser.parse_args(arguments)
+    if options.count < 1:
+        parser.error(f"--count {options.count}: must be 1 or more")
+    return ended("mutants", lambda: _run(options))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,164 @@
+"""Mutations of a module's source, one small change each, and how one is planted in the running program."""
+
+import ast
+import importlib
+import inspect
+import sys
+from collections.abc import Iterator, Sequence
+from types import CodeType, ModuleType
+from typing import NamedTuple
+
+MODULES = (
+    "emulator.encoder",
+    "emulator.firmware",
+    "emulator.fixed_point",
+    "emulator.interpreter",
+    "emulator.pid",
+    "emulator.profiler",
+    "emulator.serial_end",
+    "emulator.table",
+    "emulator.trigger",
+    "emulator.uart",
+    "protocol.codec",
+    "protocol.line_buffer",
+)
+"""What the firmware of the emulated table consists of; its plant is not what the suite tests."""
+
+_SWAPPED: dict[type[ast.AST], type[ast.AST]] = {
+    ast.Lt: ast.LtE,
+    ast.LtE: ast.Lt,
+    ast.Gt: ast.GtE,
+    ast.GtE: ast.Gt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+    ast.Is: ast.IsNot,
+    ast.IsNot: ast.Is,
+    ast.In: ast.NotIn,
+    ast.NotIn: ast.In,
+    ast.Add: ast.Sub,
+    ast.Sub: ast.Add,
+    ast.Mult: ast.FloorDiv,
+    ast.FloorDiv: ast.Mult,
+    ast.Div: ast.Mult,
+    ast.LShift: ast.RShift,
+    ast.RShift: ast.LShift,
+    ast.BitAnd: ast.BitOr,
+    ast.BitOr: ast.BitAnd,
+    ast.And: ast.Or,
+    ast.Or: ast.And,
+}
+_NAMES = {"min": "max", "max": "min"}
+_SKIPPED = (ast.Raise, ast.Assert, ast.Import, ast.ImportFrom, ast.AnnAssign)
+
+
+class Mutation(NamedTuple):
+    """One change of a module: in which function, and of which statement, before and after."""
+
+    where: str
+    change: str
+    line: int
+    module: str
+
+    def __str__(self) -> str:
+        return f"{self.where} (line {self.line}): {self.change}"
+
+
+def mutations_of(modules: Sequence[str]) -> list[Mutation]:
+    """Return all mutations of modules, in the order of their source."""
+    return [mutation for module in modules for mutation, _ in _mutated(module)]
+
+
+def planted(mutation: Mutation) -> None:
+    """Let the emulator use a mutated copy of a module; the client's side and the kit keep the module as it is."""
+    original = importlib.import_module(mutation.module)
+    mutated = ModuleType(mutation.module)
+    mutated.__file__ = original.__file__
+    code = next(_compiled(tree, original) for one, tree in _mutated(mutation.module) if one == mutation)
+    exec(code, vars(mutated))  # noqa: S102 - the project's own code
+    replaced = {id(value): vars(mutated)[name] for name, value in _own(original)}
+    for name, user in list(sys.modules.items()):
+        if name.startswith("emulator"):
+            for key, value in list(vars(user).items()):
+                if id(value) in replaced:
+                    setattr(user, key, replaced[id(value)])
+                elif key.isupper() and key in vars(original) and value == vars(original)[key]:
+                    setattr(user, key, vars(mutated)[key])
+
+
+def _own(module: ModuleType) -> Iterator[tuple[str, object]]:
+    """Yield the functions and classes that a module defines itself."""
+    for name, value in vars(module).items():
+        if (inspect.isfunction(value) or inspect.isclass(value)) and value.__module__ == module.__name__:
+            yield name, value
+
+
+def _compiled(tree: ast.Module, module: ModuleType) -> CodeType:
+    return compile(ast.fix_missing_locations(tree), str(module.__file__), "exec")
+
+
+def _mutated(module: str) -> Iterator[tuple[Mutation, ast.Module]]:
+    """Yield each mutation with the module's tree, which has it until the next one is asked for."""
+    tree = ast.parse(inspect.getsource(importlib.import_module(module)))
+    for where, statement in _statements(tree, module):
+        before = ast.unparse(statement).partition("\n")[0]
+        for node in list(_nodes(statement)):
+            for undo in _changes(node):
+                after = ast.unparse(statement).partition("\n")[0]
+                yield Mutation(where, f"{before} -> {after}", statement.lineno, module), tree
+                undo()
+
+
+def _statements(tree: ast.AST, where: str) -> Iterator[tuple[str, ast.stmt]]:
+    """Yield the statements within functions, and constants of the module, each with its place."""
+    for child in ast.iter_child_nodes(tree):
+        if isinstance(child, ast.FunctionDef | ast.ClassDef):
+            yield from _statements(child, f"{where}.{child.name}")
+        elif isinstance(child, ast.stmt) and not isinstance(child, _SKIPPED) and not _is_docstring(child):
+            yield where, child
+            if not isinstance(child, ast.Expr | ast.Assign | ast.AugAssign | ast.Return):
+                yield from _statements(child, where)
+
+
+def _is_docstring(statement: ast.stmt) -> bool:
+    return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+
+
+def _nodes(statement: ast.stmt) -> Iterator[ast.AST]:
+    """Yield a statement and its expressions, without the statements within it."""
+    yield statement
+    for child in ast.iter_child_nodes(statement):
+        if isinstance(child, ast.expr | ast.withitem | ast.match_case):
+            yield from (node for node in ast.walk(child) if not isinstance(node, ast.stmt))
+
+
+def _changes(node: ast.AST) -> Iterator["Undo"]:
+    """Change a node in each way that there is, and yield what undoes it."""
+    for field in ("op", "ops"):
+        operator = getattr(node, field, None)
+        first = operator[0] if isinstance(operator, list) else operator
+        if isinstance(first, ast.AST) and type(first) in _SWAPPED:
+            swapped = _SWAPPED[type(first)]()
+            yield Undo(node, field, [swapped, *operator[1:]] if isinstance(operator, list) else swapped)
+    if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+        other = not node.value if isinstance(node.value, bool) else node.value + 1
+        yield Undo(node, "value", other)
+    if isinstance(node, ast.Name) and node.id in _NAMES:
+        yield Undo(node, "id", _NAMES[node.id])
+    if isinstance(node, ast.If | ast.While | ast.IfExp):
+        yield Undo(node, "test", ast.UnaryOp(ast.Not(), node.test))
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        yield Undo(node, "op", ast.UAdd())
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
+        yield Undo(node, "value", ast.Constant(None))
+
+
+class Undo:
+    """A change of one field of a node, made at once; calling it takes the change back."""
+
+    def __init__(self, node: ast.AST, field: str, value: object) -> None:
+        self._node, self._field, self._before = node, field, getattr(node, field)
+        setattr(node, field, value)
+
+    def __call__(self) -> None:
+        """Take the change back."""
+        setattr(self._node, self._field, self._before)
