@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from planner.cell.scan import Scan, load_scan
-from planner.cell.unit_hints import unit_hint
 from planner.commands import options
 from planner.errors import PlannerError
 from planner.execution.run_file import PLAN_FILE, RUN_RESULTS
@@ -87,8 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
     for label, outcome in comparison.outcomes.items():
         sys.stderr.write(configuration_line(label, outcome))
     if comparison.best is None:
-        hint = unit_hint(scan) or comparison.refusal
-        sys.stdout.write(f"{scan.name}: there is no plan; {hint}\n")
+        sys.stdout.write(f"{comparison.why_no_plan(scan)}\n")
         return _NO_PLAN
     chosen, plan = problems[comparison.best], comparison.outcomes[comparison.best]
     assert isinstance(plan, Plan)

@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from planner.cell.scan import Scan
+from planner.cell.unit_hints import unit_hint
 from planner.planning.arm_motion import arm_follows
-from planner.planning.plan import NoPlan, Outcome, Plan, Planner
+from planner.planning.plan import Infeasibility, NoPlan, Outcome, Plan, Planner
 from planner.planning.problem import Problem
 from planner.progress import Progress
 
@@ -27,6 +29,14 @@ class Comparison(NamedTuple):
         refused = {name: each for name, each in self.outcomes.items() if isinstance(each, NoPlan)}
         name, farthest = max(refused.items(), key=lambda item: item[1].location or 0)
         return f"{name} gets farthest: {farthest.reason}"
+
+    def why_no_plan(self, scan: Scan) -> str:
+        """Return in one sentence why a scan has no plan; where whole locations are blocked, a wrong unit may be why."""
+        reason = f"{scan.name}: there is no plan; {self.refusal}"
+        refused = [each for each in self.outcomes.values() if isinstance(each, NoPlan)]
+        is_blocked = all(each.infeasibility is Infeasibility.BLOCKED_LOCATION for each in refused)
+        hint = unit_hint(scan) if is_blocked else None
+        return f"{reason}; {hint}" if hint else reason
 
 
 def best_configuration(

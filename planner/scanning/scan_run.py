@@ -16,7 +16,6 @@ import trimesh
 from planner.arrays import FloatArray
 from planner.cell.cell import placement
 from planner.cell.scan import Scan
-from planner.cell.unit_hints import unit_hint
 from planner.errors import PlannerError
 from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.execution.execute import Settings
@@ -166,7 +165,7 @@ def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: Progre
     }
     comparison = best_configuration(problems, PLANNERS[DEFAULT_PLANNER], progress("plan"))
     if comparison.best is None:
-        raise ScanError(f"{scan.name}: there is no plan; {unit_hint(scan) or comparison.refusal}")
+        raise ScanError(comparison.why_no_plan(scan))
     plan, on_path = comparison.outcomes[comparison.best], problems[comparison.best].arm
     assert isinstance(plan, Plan)
     assert on_path is not None
