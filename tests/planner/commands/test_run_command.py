@@ -129,7 +129,8 @@ def test_a_plan_for_a_faster_table_is_refused(
 
 def test_a_folder_without_a_run_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", str(tmp_path)]) == 2
-    assert "run.json: cannot be read: No such file or directory; python -m planner run writes a folder" in capsys.readouterr().err
+    shown = capsys.readouterr().err
+    assert "run.json: cannot be read: No such file or directory; python -m planner run writes a folder" in shown
 
 
 @pytest.mark.realtime
