@@ -43,7 +43,7 @@ class StandIn(NamedTuple):
     def speed_deg_s(self) -> float:
         return float(request(self.control, "state")["reference_speed_deg_s"])
 
-    def wait_until(self, is_moving: bool, timeout_s: float = 40.0) -> None:
+    def wait_until(self, is_moving: bool, timeout_s: float = 180.0) -> None:
         end_s = time.monotonic() + timeout_s
         while (abs(self.speed_deg_s) > 1.0) != is_moving:
             assert time.monotonic() < end_s, "the table did not begin to move" if is_moving else "the table moves on"
