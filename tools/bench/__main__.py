@@ -6,7 +6,7 @@ python -m tools.bench identify --pty
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 
 from tools.command_line import ended
@@ -17,12 +17,13 @@ SUBJECTS = ("calibration", "emulator", "identify", "map", "planner", "scan", "st
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the named benchmarks and print their tables."""
     options = _parser().parse_args(arguments)
-    return ended("bench", lambda: _run(options))
+    # Each needs libraries that the others do not. An interrupt must not break into the import of compiled ones.
+    benches = {subject: import_module(f"tools.bench.{subject}").bench for subject in options.subject}
+    return ended("bench", lambda: _run(options, benches))
 
 
-def _run(options: argparse.Namespace) -> int:
-    for subject in options.subject:
-        bench = import_module(f"tools.bench.{subject}").bench  # each needs libraries that the others do not
+def _run(options: argparse.Namespace, benches: Mapping[str, Callable[..., None]]) -> int:
+    for subject, bench in benches.items():
         if subject == "identify":
             bench(sys.stdout, options.plants, options.seed, options.jobs, options.pty, options.wide)
         else:
