@@ -98,7 +98,8 @@ class RandomWalk(RuleBasedStateMachine):
         """Set S in a motion: that goes on, and the next one has it."""
         allowed = self.rig.profile.motion
         self.rig.settings(min(10, allowed.speed_deg_s), min(60, allowed.acceleration_deg_s2))
-        self._in_motion(angle, seconds, lambda: self.rig.set_speed(self.rig.top_deg_s * share), preempts)
+        speed_deg_s = _changed(self.rig.top_deg_s, share, allowed.speed_deg_s)
+        self._in_motion(angle, seconds, lambda: self.rig.set_speed(speed_deg_s), preempts)
 
     @rule(angle=_FAR, seconds=_tenths(0.1, 0.3), share=_SHARE, preempts=st.booleans())
     @_step
@@ -106,7 +107,8 @@ class RandomWalk(RuleBasedStateMachine):
         """Set A in a motion: that goes on, and the next one has it."""
         allowed = self.rig.profile.motion
         self.rig.settings(min(20, allowed.speed_deg_s), min(40, allowed.acceleration_deg_s2))
-        self._in_motion(angle, seconds, lambda: self.rig.set_acceleration(self.rig.rate_deg_s2 * share), preempts)
+        rate_deg_s2 = _changed(self.rig.rate_deg_s2, share, allowed.acceleration_deg_s2)
+        self._in_motion(angle, seconds, lambda: self.rig.set_acceleration(rate_deg_s2), preempts)
 
     def _in_motion(self, angle: float, seconds: float, change: Callable[[], None], preempts: bool) -> None:
         """Begin a motion, change a setting in it, and begin the next one, in the motion or after it."""
@@ -210,3 +212,8 @@ class RandomWalk(RuleBasedStateMachine):
             f"the table is {excess:.3g} deg from where its reference can be, at {sample.position_deg:g} deg",
         )
         return sample.position_deg
+
+
+def _changed(value: float, share: float, allowed: float) -> float:
+    """Return a value changed by a share; the other way where that would be more than the profile allows."""
+    return value * share if value * share <= allowed else value / share
