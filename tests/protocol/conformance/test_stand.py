@@ -86,7 +86,7 @@ def test_a_program_that_is_not_there_is_told_before_anything_moves(
 
 
 def test_a_trigger_that_fails_is_an_error_and_the_table_goes_home() -> None:
-    outcomes, table = outcomes_with(Programs(FAILURE, ()), "6.2/1", "7.2/1")
+    outcomes, table = outcomes_with(Programs(FAILURE, ()), "6.2/1$", "7.2/1")
     assert [outcome.verdict for outcome in outcomes] == [Verdict.ERROR, Verdict.PASS]
     assert "ended with status 3: the relay is stuck" in outcomes[0].reason
     status = table.status()
