@@ -132,7 +132,7 @@ def test_an_ignored_ctrl_c_stays_ignored(tmp_path: Path) -> None:
     ["planner", "plan", "cylinder", "--out", "out"],
     ["tools.tune", "--out", "out"],
     ["tools.bench", "map"],
-    ["protocol.conformance", "--list"],
+    ["protocol.conformance", "--port", "emulator://", "--out", "out"],
     ["emulator", "--pty"],
 ], ids=lambda words: words[0])  # fmt: skip
 def test_ctrl_c_as_a_program_starts_is_one_line_and_status_130(program: Sequence[str], tmp_path: Path) -> None:
