@@ -115,7 +115,7 @@ def fault_from(kind: object, given: Mapping[str, object]) -> Fault:
         FaultError: there is no such fault, a number is missing, unknown or out of its range, or it has two beginnings.
     """
     if not isinstance(kind, str) or kind not in KINDS:
-        raise FaultError(f"{brief(kind)} is no fault; there are {', '.join(KINDS)}")
+        raise FaultError(f"{brief(kind)} is not a fault; there are {', '.join(KINDS)}")
     _check_numbers(kind, given)
     numbers = {name: float(value) for name, value in given.items() if isinstance(value, int | float)}
     own = (parameter.name for parameter in KINDS[kind].parameters)

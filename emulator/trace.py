@@ -160,15 +160,15 @@ def read_trace(path: Path) -> Trace:
     """Return a trace that `TraceWriter` wrote.
 
     Raises:
-        ValueError: the file is no trace.
+        ValueError: the file is not a trace.
         OSError: the file cannot be read.
     """
     try:
         return _trace_of(_read_npz(path) if path.suffix == ".npz" else _read_csv(path))
     except UnicodeError as error:
-        raise ValueError(f"{path}: is no trace: it is not text in ASCII") from error
+        raise ValueError(f"{path}: is not a trace: it is not text in ASCII") from error
     except (ValueError, TypeError, EOFError, NotImplementedError, csv.Error, zipfile.BadZipFile, zlib.error) as error:
-        raise ValueError(f"{path}: is no trace: {' '.join(str(error)[:_LONGEST_REASON].split())}") from error
+        raise ValueError(f"{path}: is not a trace: {' '.join(str(error)[:_LONGEST_REASON].split())}") from error
 
 
 def _trace_of(columns: Mapping[str, Any]) -> Trace:

@@ -134,7 +134,7 @@ def _check(plan_file: Path, run_input: RunInput) -> None:
 
 
 def _check_arm(plan_file: Path, run_input: RunInput, planned_arm: PlannedArm) -> None:
-    """Refuse a plan that the arm cannot follow, by its own word or by ours, or whose arm is not that of the map."""
+    """Refuse a plan that the arm cannot follow, by the file or by our own check, or whose arm is not the map's."""
     if run_input.problem.map.metadata.get("arm") != json.loads(json.dumps(asdict(planned_arm.cell.arm))):
         raise RunInputError(f"{plan_file}: its arm is not the arm that its map was made for; compute map and plan anew")
     if len(planned_arm.T_WS) != run_input.problem.map.location_count:

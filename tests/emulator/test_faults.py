@@ -55,7 +55,7 @@ def test_the_three_ways_take_the_same_names_and_numbers(kind: str, tmp_path: Pat
 @pytest.mark.parametrize(
     ("kind", "numbers", "words"),
     [
-        ("gremlins", {}, "'gremlins' is no fault; there are drop, "),
+        ("gremlins", {}, "'gremlins' is not a fault; there are drop, "),
         ("drop", {}, "drop: probability is missing; it must be a number from 0 to 1"),
         ("drop", {"probability": 2}, "drop: probability is 2; it must be a number from 0 to 1"),
         ("drop", {"probability": math.nan}, "drop: probability is nan"),

@@ -111,7 +111,7 @@ def test_a_file_that_is_no_trace_is_refused(tmp_path: Path) -> None:
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     np.savez(tmp_path / "other.npz", a=np.zeros(3))
     for name in ("other.csv", "other.npz"):
-        with pytest.raises(ValueError, match="is no trace"):
+        with pytest.raises(ValueError, match="is not a trace"):
             read_trace(tmp_path / name)
 
 
@@ -125,7 +125,7 @@ def test_a_trace_that_was_cut_or_changed_is_refused_by_its_name(name: str, tmp_p
     damaged += [whole[: index + 8] + b"\x41" + whole[index + 9 :], whole.replace(b"0", b"\xff")]
     for content in damaged[:-1] if name.endswith("npz") else damaged[-1:]:
         (tmp_path / name).write_bytes(content)
-        with pytest.raises(ValueError, match=f"{name}: is no trace: "):
+        with pytest.raises(ValueError, match=f"{name}: is not a trace: "):
             read_trace(tmp_path / name)
 
 
