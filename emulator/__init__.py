@@ -8,10 +8,10 @@ import protocol.quiet_start  # noqa: F401 - before the imports that take long
 # isort: split
 import serial
 
-from emulator.config import TableConfig, load_config
-from emulator.status import TableStatus
-from emulator.table import Table
-from emulator.toml_section import ConfigError
+from emulator.config.table_config import TableConfig, load_config
+from emulator.config.toml_section import ConfigError
+from emulator.table.status import TableStatus
+from emulator.table.table import Table
 
 __all__ = ["ConfigError", "Table", "TableConfig", "TableStatus", "load_config"]
 

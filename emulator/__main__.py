@@ -10,15 +10,15 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from emulator.clock import TIME_SCALE, Clock
-from emulator.config import TableConfig, load_config
-from emulator.parameter import brief
-from emulator.port import Port
-from emulator.server import SERVED_SIGNALS, Server
-from emulator.signals import SignalWatch
-from emulator.table import Table
-from emulator.tcp_port import TcpPort, parse_address
-from emulator.toml_section import ConfigError
+from emulator.config.table_config import TableConfig, load_config
+from emulator.config.toml_section import ConfigError
+from emulator.faults.parameter import brief
+from emulator.ports.port import Port
+from emulator.ports.tcp_port import TcpPort, parse_address
+from emulator.server.clock import TIME_SCALE, Clock
+from emulator.server.server import SERVED_SIGNALS, Server
+from emulator.server.signals import SignalWatch
+from emulator.table.table import Table
 from emulator.trace import TraceError, TraceWriter
 
 _EXAMPLE = """example:
@@ -32,7 +32,7 @@ trigger; Ctrl-C or SIGTERM end the stand-in with status 0.
 _MOST_DIGITS = 30
 
 if TYPE_CHECKING:
-    from emulator.control import ControlSocket
+    from emulator.server.control_socket import ControlSocket
 
 
 class UsageError(Exception):
@@ -163,7 +163,7 @@ def _open_ports(options: argparse.Namespace, config: TableConfig, stack: ExitSta
         stack.callback(port.close)
         ports.append(port)
     if options.rfc2217:
-        from emulator.rfc2217_port import Rfc2217Port  # noqa: PLC0415  # rarely asked for, and a start should be quick
+        from emulator.ports.rfc2217_port import Rfc2217Port  # noqa: PLC0415  # rarely asked for, and a start should be quick
 
         host, number = options.rfc2217
         with _usage(f"--rfc2217 {host}:{number}"):
@@ -176,8 +176,8 @@ def _open_ports(options: argparse.Namespace, config: TableConfig, stack: ExitSta
 def _open_pty(link_path: Path | None, baud: int, stack: ExitStack) -> Port:
     try:
         # Here, since a system without ptys has not what these modules import.
-        from emulator.device_link import DeviceLink  # noqa: PLC0415  # see above
-        from emulator.pty_port import PtyPort  # noqa: PLC0415  # see above
+        from emulator.ports.device_link import DeviceLink  # noqa: PLC0415  # see above
+        from emulator.ports.pty_port import PtyPort  # noqa: PLC0415  # see above
     except ImportError:
         raise UsageError("--pty: this system has no pseudo-terminals; use --tcp 0 and the URL that it prints") from None
     with _usage("--pty"):
@@ -193,7 +193,7 @@ def _open_pty(link_path: Path | None, baud: int, stack: ExitStack) -> Port:
 
 
 def _open_control(path: Path, stack: ExitStack) -> "ControlSocket":
-    from emulator.control import ControlSocket  # noqa: PLC0415  # rarely asked for, and a start should be quick
+    from emulator.server.control_socket import ControlSocket  # noqa: PLC0415  # rarely asked for, and a start should be quick
 
     if not hasattr(socket, "AF_UNIX"):
         raise UsageError("--control: this system has no Unix sockets; start the table without it")

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from emulator.control_commands import COMMANDS, RequestError, parsed_line
+from emulator.server.control_commands import COMMANDS, RequestError, parsed_line
 
 _TIMEOUT_S = 5.0
 _LONGEST_ANSWER = 1 << 16

@@ -13,10 +13,10 @@ from urllib.parse import parse_qsl, urlsplit
 import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException, SerialTimeoutException
 
-from emulator.config import TableConfig, load_config
-from emulator.fast_ticks import FastTicks
-from emulator.framing import rates_agree, read_at_rate
-from emulator.table import Table
+from emulator.config.table_config import TableConfig, load_config
+from emulator.line.framing import rates_agree, read_at_rate
+from emulator.table.fast_ticks import FastTicks
+from emulator.table.table import Table
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer

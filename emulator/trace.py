@@ -15,7 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-from emulator.status import TableStatus
+from emulator.table.status import TableStatus
 
 if TYPE_CHECKING:
     import numpy as np

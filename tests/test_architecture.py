@@ -18,8 +18,28 @@ MAY_IMPORT = {
     "tools": {"emulator", "planner", "protocol", "tools"},
 }
 
-PLANNER_LAYERS = ["geometry", "kinematics", "table", "cell", "map", "planning", "execution", "scanning", "commands"]
-"""The planner's folders from the lowest up; each may import from those before it, and from the files beside them."""
+ROOMS = {
+    "planner": ["geometry", "kinematics", "table", "cell", "map", "planning", "execution", "scanning", "commands"],
+    "emulator": ["plant", "firmware", "line", "faults", "config", "table", "ports", "server"],
+    "protocol/conformance": [
+        "profile",
+        "bench",
+        "judgement",
+        "cases",
+        "session",
+        "results",
+        "commands",
+        "pytest",
+    ],
+}
+"""The folders of a package in the order in which data travels; each may import from itself and those before it."""
+
+ABOVE_THE_ROOMS = {
+    "planner": {"__main__"},
+    "emulator": {"__init__", "__main__", "control_client", "protocol_emulator", "trace"},
+    "protocol/conformance": {"__init__", "__main__"},
+}
+"""The files beside the rooms that may import from them; all others serve every room."""
 
 EDGE_MODULES = {
     "asyncio",
@@ -46,28 +66,27 @@ PROTOCOL_EDGE = {
     "protocol/interrupts.py": {"signal", "threading"},
     "protocol/quiet_start.py": {"os", "signal"},
     "protocol/conformance/__main__.py": {"pathlib"},
-    "protocol/conformance/command_line.py": {"os"},
+    "protocol/conformance/commands/command_line.py": {"os"},
     "protocol/data_file.py": {"pathlib"},
-    "protocol/conformance/fixture.py": {"os", "pathlib", "subprocess"},
-    "protocol/conformance/host_watch.py": {"os", "select", "threading", "time"},
-    "protocol/conformance/ports.py": {"pathlib", "serial"},
-    "protocol/conformance/profile.py": {"pathlib"},
-    "protocol/conformance/program.py": {"os", "signal", "subprocess"},
-    "protocol/conformance/pytest_plugin.py": {"pathlib"},
-    "protocol/conformance/record.py": {"pathlib"},
-    "protocol/conformance/replay_run.py": {"pathlib"},
-    "protocol/conformance/report.py": {"pathlib"},
-    "protocol/conformance/stand.py": {"pathlib", "socket"},
-    "protocol/conformance/suite_run.py": {"datetime", "os", "pathlib"},
+    "protocol/conformance/pytest/fixture.py": {"os", "pathlib", "subprocess"},
+    "protocol/conformance/bench/host_watch.py": {"os", "select", "threading", "time"},
+    "protocol/conformance/bench/ports.py": {"pathlib", "serial"},
+    "protocol/conformance/profile/profile.py": {"pathlib"},
+    "protocol/conformance/bench/program.py": {"os", "signal", "subprocess"},
+    "protocol/conformance/pytest/plugin.py": {"pathlib"},
+    "protocol/conformance/results/record.py": {"pathlib"},
+    "protocol/conformance/commands/replay_run.py": {"pathlib"},
+    "protocol/conformance/results/report.py": {"pathlib"},
+    "protocol/conformance/bench/stand.py": {"pathlib", "socket"},
+    "protocol/conformance/commands/suite_run.py": {"datetime", "os", "pathlib"},
     "protocol/serial_port.py": {"serial"},
 }
 
 EMULATOR_EDGE = {
     "__main__",
     "clock",
-    "config",
-    "control",
     "control_client",
+    "control_socket",
     "device_link",
     "inotify",
     "machine_code_folder",
@@ -76,6 +95,7 @@ EMULATOR_EDGE = {
     "rfc2217_port",
     "server",
     "signals",
+    "table_config",
     "tcp_port",
     "terminal_baud",
     "trace",
@@ -127,19 +147,40 @@ def test_no_imports_run_in_a_circle() -> None:
     TopologicalSorter(needs).prepare()  # raises a CycleError that names the circle
 
 
-def test_each_folder_of_the_planner_is_a_layer() -> None:
-    assert {source.parent.name for source in (ROOT / "planner").glob("*/*.py")} == set(PLANNER_LAYERS)
+@pytest.mark.parametrize("package", ROOMS)
+def test_each_folder_of_a_package_is_a_room_that_says_what_it_is(package: str) -> None:
+    assert {source.parent.name for source in (ROOT / package).glob("*/*.py") if package in source.as_posix()} - {
+        "conformance"
+    } == set(ROOMS[package])
+    for room in ROOMS[package]:
+        assert ast.get_docstring(ast.parse((ROOT / package / room / "__init__.py").read_text(encoding="utf-8")))
 
 
-@pytest.mark.parametrize("layer", PLANNER_LAYERS)
-def test_the_planner_s_layers_import_only_from_those_below(layer: str) -> None:
-    above = PLANNER_LAYERS[PLANNER_LAYERS.index(layer) + 1 :]
-    assert imports_from([f"planner.{name}" for name in above], (ROOT / "planner" / layer).rglob("*.py")) == []
+@pytest.mark.parametrize(("package", "room"), [(package, room) for package, rooms in ROOMS.items() for room in rooms])
+def test_a_room_imports_only_from_those_before_it(package: str, room: str) -> None:
+    name = package.replace("/", ".")
+    after = [f"{name}.{other}" for other in ROOMS[package][ROOMS[package].index(room) + 1 :]]
+    above = [f"{name}.{module}" for module in ABOVE_THE_ROOMS[package] if module != "__init__"]
+    assert imports_from(after + above, (ROOT / package / room).rglob("*.py")) == []
 
 
-def test_the_files_beside_the_planner_s_layers_need_none_of_them() -> None:
-    sources = set((ROOT / "planner").glob("*.py")) - {ROOT / "planner/__main__.py"}
-    assert imports_from([f"planner.{name}" for name in PLANNER_LAYERS], sources) == []
+@pytest.mark.parametrize("package", ROOMS)
+def test_the_files_beside_the_rooms_need_none_of_them(package: str) -> None:
+    name = package.replace("/", ".")
+    sources = [source for source in (ROOT / package).glob("*.py") if source.stem not in ABOVE_THE_ROOMS[package]]
+    assert imports_from([f"{name}.{room}" for room in ROOMS[package]], sources) == []
+
+
+CORE = ("plant", "firmware", "line")
+"""The rooms of the emulator that another simulator may take over: they take constants as values and know no file."""
+
+
+@pytest.mark.parametrize("room", CORE)
+def test_the_core_needs_nothing_but_itself_and_the_standard_library(room: str) -> None:
+    ours = tuple(f"emulator.{name}." for name in (*CORE, "int32"))
+    for source in (ROOT / "emulator" / room).glob("*.py"):
+        for name in imported_modules(source):
+            assert f"{name}.".startswith(ours) or name.partition(".")[0] in sys.stdlib_module_names, (source, name)
 
 
 def touched_at_the_edge(package: str) -> dict[str, set[str]]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from emulator.config import TableConfig, load_config
+from emulator.config.table_config import TableConfig, load_config
 
 
 def config_toml(config: TableConfig, comment: str, always: frozenset[str] = frozenset()) -> str:

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from emulator.batch import COLUMNS, MOVE_BY, MOVE_TO, run
-from emulator.config import GainsConfig, GainSetsConfig, TableConfig
-from emulator.drive_train import at_standstill
-from emulator.fixed_point import POSITION_BITS, SPEED_BITS, to_fixed
-from emulator.profiler import Profile
-from emulator.tick import TableConstants, TableState, table_constants, woken
+from emulator.config.table_config import GainsConfig, GainSetsConfig, TableConfig
+from emulator.firmware.fixed_point import POSITION_BITS, SPEED_BITS, to_fixed
+from emulator.firmware.profiler import Profile
+from emulator.plant.drive_train import at_standstill
+from emulator.table.batch import COLUMNS, MOVE_BY, MOVE_TO, run
+from emulator.table.tick import TableConstants, TableState, table_constants, woken
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def switched_on(config: TableConfig, seed: int) -> tuple[TableConstants, TableSt
 
 
 def motion_rows(config: TableConfig, motions: list[Motion]) -> NDArray[np.int64]:
-    """Return motions as `emulator.batch` takes them."""
+    """Return motions as `emulator.table.batch` takes them."""
     count_deg, tick_hz = config.counts_per_turn / 360.0, config.control.tick_hz
     rows = [
         (

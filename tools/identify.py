@@ -9,8 +9,8 @@ import sys
 from math import inf
 from pathlib import Path
 
-from emulator.config import load_config
-from emulator.toml_section import ConfigError
+from emulator.config.table_config import load_config
+from emulator.config.toml_section import ConfigError
 from planner.whole_file import write_whole
 from protocol.client import TableClient
 from protocol.errors import TableError

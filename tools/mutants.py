@@ -46,12 +46,12 @@ def explanations(file: Path = EXPLAINED) -> list[Explanation]:
 def verdict_on(mutation: Mutation, seed: int) -> str:
     """Plant a mutation in this process, and return which case fails and how, or nothing if all pass."""
     from emulator.protocol_emulator import RUN, Serial  # noqa: PLC0415 - the mutation is planted in what is loaded
-    from protocol.conformance.catalogue import all_cases  # noqa: PLC0415
-    from protocol.conformance.profile import load_profile  # noqa: PLC0415
-    from protocol.conformance.stand import InProcess  # noqa: PLC0415
-    from protocol.conformance.suite import Session, SessionError  # noqa: PLC0415
-    from protocol.conformance.verdict import Verdict  # noqa: PLC0415
-    from protocol.conformance.wire import RecordedPort  # noqa: PLC0415
+    from protocol.conformance.bench.stand import InProcess  # noqa: PLC0415
+    from protocol.conformance.bench.wire import RecordedPort  # noqa: PLC0415
+    from protocol.conformance.cases.catalogue import all_cases  # noqa: PLC0415
+    from protocol.conformance.judgement.verdict import Verdict  # noqa: PLC0415
+    from protocol.conformance.profile.profile import load_profile  # noqa: PLC0415
+    from protocol.conformance.session.suite import Session, SessionError  # noqa: PLC0415
 
     RUN.warm_up_ticks = sys.maxsize  # compiled code would be that of the table without the mutation
     planted(mutation)

@@ -9,16 +9,16 @@ from types import CodeType, ModuleType
 from typing import NamedTuple
 
 MODULES = (
-    "emulator.encoder",
-    "emulator.firmware",
-    "emulator.fixed_point",
-    "emulator.interpreter",
-    "emulator.pid",
-    "emulator.profiler",
-    "emulator.serial_end",
-    "emulator.table",
-    "emulator.trigger",
-    "emulator.uart",
+    "emulator.plant.encoder",
+    "emulator.firmware.controller",
+    "emulator.firmware.fixed_point",
+    "emulator.table.interpreter",
+    "emulator.firmware.pid",
+    "emulator.firmware.profiler",
+    "emulator.table.serial_end",
+    "emulator.table.table",
+    "emulator.table.trigger",
+    "emulator.line.uart",
     "protocol.codec",
     "protocol.line_buffer",
 )

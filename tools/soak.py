@@ -14,9 +14,9 @@ from pathlib import Path
 from random import Random
 from typing import NamedTuple
 
-from emulator.config import load_config
-from emulator.fast_ticks import FastTicks
-from emulator.table import Table
+from emulator.config.table_config import load_config
+from emulator.table.fast_ticks import FastTicks
+from emulator.table.table import Table
 from protocol.client import TableClient
 from protocol.codec import decode_reply
 from protocol.messages import Angle, Ok, Refusal

@@ -12,8 +12,8 @@ from contextlib import ExitStack
 from math import inf
 from pathlib import Path
 
-from emulator.config import load_config
-from emulator.toml_section import ConfigError
+from emulator.config.table_config import load_config
+from emulator.config.toml_section import ConfigError
 from planner.whole_file import whole_file
 from tools.command_line import check_folder, ended
 from tools.progress import Progress

@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from protocol.conformance.case import Case
-from protocol.conformance.catalogue import chosen_cases
-from protocol.conformance.command_line import UsageError, say, tell
-from protocol.conformance.ports import SessionError, open_port
-from protocol.conformance.profile import ProfileError, load_profile
-from protocol.conformance.record import RecordError
-from protocol.conformance.replay_run import run_replay
-from protocol.conformance.stand import StandError
-from protocol.conformance.suite_run import run_suite
+from protocol.conformance.bench.ports import SessionError, open_port
+from protocol.conformance.bench.stand import StandError
+from protocol.conformance.cases.case import Case
+from protocol.conformance.cases.catalogue import chosen_cases
+from protocol.conformance.commands.command_line import UsageError, say, tell
+from protocol.conformance.commands.replay_run import run_replay
+from protocol.conformance.commands.suite_run import run_suite
+from protocol.conformance.profile.profile import ProfileError, load_profile
+from protocol.conformance.results.record import RecordError
 from protocol.interrupts import ended_by_signals, status_after
 
 _EXAMPLE = """examples:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from emulator.control import ControlSocket
+from emulator.server.control_socket import ControlSocket
 from tests.emulator.fault_bench import Bench
 from tests.emulator.quiet_stand import QuietStand
 

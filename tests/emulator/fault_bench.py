@@ -1,6 +1,6 @@
 """A table in virtual time with its port and its client, for faults to strike."""
 
-from emulator.faults import fault_from
+from emulator.faults.fault import fault_from
 from emulator.protocol_emulator import Serial
 from protocol import TableClient
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 
 Solved = Any  # scipy ships no types
 

@@ -1,9 +1,9 @@
 """A stand-in that stands still, for the control channel to act on."""
 
-from emulator.config import load_config
-from emulator.faults import Fault
-from emulator.status import TableStatus
-from emulator.table import Table
+from emulator.config.table_config import load_config
+from emulator.faults.fault import Fault
+from emulator.table.status import TableStatus
+from emulator.table.table import Table
 
 
 class QuietStand:

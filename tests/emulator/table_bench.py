@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from emulator.config import load_config
-from emulator.status import TableStatus
-from emulator.table import Table
+from emulator.config.table_config import load_config
+from emulator.table.status import TableStatus
+from emulator.table.table import Table
 
 PACED = load_config()
 UNPACED = PACED.with_serial(baud=0, decimals=6)

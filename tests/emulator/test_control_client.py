@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from emulator.control_client import ControlError, main, request
-from emulator.control_commands import COMMANDS
+from emulator.server.control_commands import COMMANDS
 from tests.emulator.quiet_stand import QuietStand
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Unix sockets")

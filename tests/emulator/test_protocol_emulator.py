@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import emulator
-from emulator.faults import fault_from
+from emulator.faults.fault import fault_from
 from emulator.protocol_emulator import OUTPUT_BYTES, Serial
 from protocol import TableClient, WallClock
 from protocol.clock import clock_of

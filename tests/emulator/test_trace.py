@@ -10,8 +10,8 @@ from typing import IO
 import numpy as np
 import pytest
 
-from emulator.config import load_config
-from emulator.table import Table
+from emulator.config.table_config import load_config
+from emulator.table.table import Table
 from emulator.trace import TraceError, TraceWriter, read_trace
 
 TICK_HZ = 1000

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
-from emulator.faults import fault_from
+from emulator.faults.fault import fault_from
 from protocol import NotStopped, PortError, TableClient
 
 FASTEST, HARDEST = 40.0, 100.0

@@ -86,7 +86,7 @@ def test_where_nothing_can_be_written_is_said_beforehand(tmp_path: Path) -> None
 
 INTERRUPTED_RUN = """
 import os, signal, sys, threading
-from emulator.config import load_config
+from emulator.config.table_config import load_config
 from tools.command_line import ended
 from tools.emulated import Motion, emulate
 

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from emulator.config import TableConfig, load_config
+from emulator.config.table_config import TableConfig, load_config
 from tools.config_file import config_toml
 
 CONFIG = load_config()

@@ -5,7 +5,7 @@ import inspect
 
 import pytest
 
-from emulator import profiler
+from emulator.firmware import profiler
 from tools import mutants
 from tools.mutants import explanations, main, verdict_in_a_process
 from tools.mutation import MODULES, mutations_of
@@ -15,7 +15,7 @@ ALL = mutations_of(MODULES)
 
 def test_a_mutation_differs_in_one_line_and_leaves_the_source_alone() -> None:
     before = inspect.getsource(profiler)
-    for mutation in mutations_of(["emulator.profiler"]):
+    for mutation in mutations_of(["emulator.firmware.profiler"]):
         old, _, new = mutation.change.partition(" -> ")
         assert old != new
         assert old.split()[0] in before.splitlines()[mutation.line - 1]

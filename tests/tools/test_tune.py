@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from emulator.config import load_config
+from emulator.config.table_config import load_config
 from tools.tune import main
 
 

@@ -17,12 +17,12 @@ from typing import TextIO
 import control
 import numpy as np
 
-from emulator import batch
-from emulator.config import TableConfig, load_config
-from emulator.interpreter import Interpreter
+from emulator.config.table_config import TableConfig, load_config
 from emulator.protocol_emulator import RUN, Serial
-from emulator.table import Table
-from emulator.tick import TableConstants, TableState
+from emulator.table import batch
+from emulator.table.interpreter import Interpreter
+from emulator.table.table import Table
+from emulator.table.tick import TableConstants, TableState
 from tools.bench.timing import median_s, percentile, print_table
 from tools.bench.virtual_run import random_run_inputs, run_in_virtual_time
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import NamedTuple, TextIO
 
 import emulator  # noqa: F401  # teaches pyserial the port emulator://
-from emulator.config import load_config
+from emulator.config.table_config import load_config
 from protocol.client import TableClient
 from tools.bench.identify_tables import DEFAULT, NARROW, WIDE, Family, write_constants
 from tools.bench.timing import print_table

@@ -6,7 +6,7 @@ from pathlib import Path
 from random import Random
 from typing import NamedTuple
 
-from emulator.config import load_config
+from emulator.config.table_config import load_config
 
 SPREAD = {
     "motor.torque_constant_Nm_A": 0.3,

@@ -7,8 +7,8 @@ import sys
 import time
 from pathlib import Path
 
-from emulator.config import load_config
-from emulator.table import Table
+from emulator.config.table_config import load_config
+from emulator.table.table import Table
 
 
 def interpreted_run(angle_deg: float, motions: int, simulated_s: float) -> tuple[float, float]:

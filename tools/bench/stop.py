@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TextIO, cast
 import serial
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
-from emulator.faults import fault_from
+from emulator.faults.fault import fault_from
 from planner.cell.scan import shipped_scans
 from planner.execution.execute import bring_to, execute
 from planner.execution.run_input import RunInput

@@ -4,7 +4,7 @@ from math import log, pi, sqrt
 
 import numpy as np
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.identification.constants import DERIVED, Derived, log_slope
 from tools.identification.errors import RecordingError
 from tools.identification.identify_table import Identified

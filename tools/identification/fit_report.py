@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.config_file import config_toml
 from tools.html_report import BLUE, ORANGE, figure_block, heading, new_figure, page, paragraph, svg_of, table_block
 from tools.identification.constants import Constant

@@ -5,7 +5,7 @@ from dataclasses import replace
 from math import exp, log
 from typing import Any, NamedTuple
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 
 
 class Parameter(NamedTuple):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.emulated import Array
 from tools.identification.likelihood import Intervals
 from tools.identification.parameters import PARAMETERS, with_logarithms

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.emulated import Array
 from tools.identification.errors import RecordingError
 from tools.identification.recording import BITS_A_BYTE, DriveRecording, WireRecording

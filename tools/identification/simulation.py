@@ -11,12 +11,13 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from emulator import drive_train
-from emulator.batch import COLUMNS, run
-from emulator.config import TableConfig
-from emulator.drive_train import DriveState, DriveTrain, at_standstill
-from emulator.profiler import Profile
-from emulator.tick import table_constants, woken
+from emulator.config.constants import drive_constants
+from emulator.config.table_config import TableConfig
+from emulator.firmware.profiler import Profile
+from emulator.plant import drive_train
+from emulator.plant.drive_train import DriveState, DriveTrain, at_standstill
+from emulator.table.batch import COLUMNS, run
+from emulator.table.tick import table_constants, woken
 from protocol.interrupts import signals_wait
 from tools.emulated import Array, Motion, motion_rows
 from tools.identification.recording import DriveRecording, WireRecording
@@ -36,7 +37,7 @@ MIDDLE = Standstill()
 
 
 def commanded_motions(config: TableConfig, recording: WireRecording, ticks: Array) -> NDArray[np.int64]:
-    """Return the motions of a recording as `emulator.batch` takes them, from the position of the first reading.
+    """Return the motions of a recording as `emulator.table.batch` takes them, from the position of the first reading.
 
     Args:
         config: The table.
@@ -94,7 +95,7 @@ def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) ->
     padded = np.concatenate([np.zeros(whole + 2), duty])[: len(duty) + 1]
     share = delay_ticks - whole
     applied = (padded[1:] * (1.0 - share) + padded[:-1] * share) * config.driver.supply_V
-    train = drive_train.drive_train(config)
+    train = drive_constants(config)
     angle = np.empty(len(duty))
     with signals_wait():
         _run_open(train, at_standstill(train, MIDDLE.gap_share), applied, angle)
@@ -114,5 +115,5 @@ def _open_loop(train: DriveTrain, state: DriveState, voltage_V: Array, angle_rad
         angle_rad[tick] = state.angle_rad
 
 
-# `emulator.batch` has made the plant's functions known to numba.
+# `emulator.table.batch` has made the plant's functions known to numba.
 _run_open: Any = numba.njit(error_model="numpy", nogil=True)(_open_loop)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.emulated import Array
 from tools.identification.recording import BITS_A_BYTE, WireRecording
 from tools.identification.reply_grid import reply_grid

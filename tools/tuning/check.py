@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.emulated import Array
 
 _FAR_S, _RAMP_TO = 100.0, 0.5

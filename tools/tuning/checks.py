@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.tuning.check import Check, Figure
 from tools.tuning.linear_checks import load_step, ramp, step
 from tools.tuning.nonlinear_checks import creep, reversal, small_moves

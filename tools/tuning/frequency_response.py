@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from threadpoolctl import threadpool_limits
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.tuning.linear_model import Teeth, load_ratio, motor_system
 
 Complex = NDArray[np.complex128]

@@ -2,9 +2,9 @@
 
 from dataclasses import fields
 
-from emulator.config import GainsConfig, TableConfig
-from emulator.fixed_point import GAIN_BITS, INTEGRAL_GAIN_BITS
-from emulator.pid import Gains
+from emulator.config.table_config import GainsConfig, TableConfig
+from emulator.firmware.fixed_point import GAIN_BITS, INTEGRAL_GAIN_BITS
+from emulator.firmware.pid import Gains
 from tools.config_file import config_toml
 from tools.tuning.linear_model import duty_gains
 

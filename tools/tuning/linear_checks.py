@@ -4,8 +4,8 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from emulator.config import TableConfig
-from emulator.pid import fixed_gains
+from emulator.config.constants import fixed_gains
+from emulator.config.table_config import TableConfig
 from tools.emulated import Array, Load, Motion, emulate
 from tools.tuning.check import Check, Curve, Figure, far_deg, greatest_ramp
 from tools.tuning.linear_model import INTEGRAL_STATE, Teeth, closed_loop, duty_gains, load_ratio, moving_friction_Nm

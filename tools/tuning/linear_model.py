@@ -2,7 +2,7 @@
 
 Between two control ticks the duty is held, so motor, gears and load are discretised with a zero-order hold. The
 loop's timing is the firmware's: the speed is the count's difference over a window of W ticks, and a new duty waits one
-tick in the PWM's buffer before it is on the bridge (`emulator.tick`).
+tick in the PWM's buffer before it is on the bridge (`emulator.table.tick`).
 
 What is not linear is left out and stated elsewhere: dry friction acts as a constant load while the table turns, the
 quantisation of speed and PWM as two noises (`quantisation_noise`), and the backlash as the states of `Teeth`.
@@ -15,9 +15,9 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from emulator.config import TableConfig
-from emulator.fixed_point import GAIN_BITS, INTEGRAL_GAIN_BITS
-from emulator.pid import Gains
+from emulator.config.table_config import TableConfig
+from emulator.firmware.fixed_point import GAIN_BITS, INTEGRAL_GAIN_BITS
+from emulator.firmware.pid import Gains
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ INTEGRAL_STATE = -3
 
 
 class Teeth(StrEnum):
-    """What the motor turns, by the state of the backlash (`emulator.drive_train`)."""
+    """What the motor turns, by the state of the backlash (`emulator.plant.drive_train`)."""
 
     DRIVING = "engaged, driving"
     OVERHAULING = "engaged, overhauling"

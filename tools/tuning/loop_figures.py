@@ -6,7 +6,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.tuning.frequency_response import Array, Complex, PlantResponse, grid_hz, grid_z, plant_response
 from tools.tuning.linear_model import Teeth, duty_gains, quantisation_noise, speed_gain_deg_s
 from tools.tuning.margins import controller, margins, noise_duty

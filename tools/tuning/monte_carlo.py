@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.tuning.bounds import Bound
 from tools.tuning.frequency_response import Array
 from tools.tuning.gain_design import Design

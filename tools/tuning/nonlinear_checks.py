@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from emulator.config import TableConfig
-from emulator.firmware import IDLE
+from emulator.config.table_config import TableConfig
+from emulator.firmware.controller import IDLE
 from tools.emulated import Answer, Motion, emulate
 from tools.tuning.check import Check, Curve, Figure, far_deg, greatest_ramp
 

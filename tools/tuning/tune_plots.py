@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from emulator.pid import Gains
+from emulator.firmware.pid import Gains
 from tools.html_report import BLUE, GREEN, GREY, ORANGE, RED, new_figure, report_style, svg_of
 from tools.tuning.check import Check
 from tools.tuning.frequency_response import Complex

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from emulator.pid import Gains
+from emulator.firmware.pid import Gains
 from tools.html_report import figure_block, heading, page, paragraph, table_block
 from tools.tuning.bounds import Bound
 from tools.tuning.check import Figure

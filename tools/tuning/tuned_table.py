@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from emulator.config import TableConfig
-from emulator.pid import Gains, fixed_gains
+from emulator.config.constants import fixed_gains
+from emulator.config.table_config import TableConfig
+from emulator.firmware.pid import Gains
 from tools.emulated import with_gains
 from tools.tuning.bounds import Bound, Limits
 from tools.tuning.check import Check

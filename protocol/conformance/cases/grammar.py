@@ -2,10 +2,10 @@
 
 from decimal import Decimal
 
-from protocol.conformance.case import case
-from protocol.conformance.rig import Rig
-from protocol.conformance.stand import PRESET
-from protocol.conformance.wire_checks import number
+from protocol.conformance.bench.stand import PRESET
+from protocol.conformance.cases.case import case
+from protocol.conformance.judgement.rig import Rig
+from protocol.conformance.judgement.wire_checks import number
 from protocol.messages import LINE_LIMIT, ErrorCode, Verb
 
 _LETTERS = {verb.encode() for verb in Verb}

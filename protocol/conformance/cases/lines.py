@@ -1,10 +1,10 @@
 """Chapter 3: from bytes to lines."""
 
-from protocol.conformance.case import case
-from protocol.conformance.rig import Rig
-from protocol.conformance.stand import DISCONNECT, ERROR_REPLIES
-from protocol.conformance.verdict import require
-from protocol.conformance.wire_checks import number
+from protocol.conformance.bench.stand import DISCONNECT, ERROR_REPLIES
+from protocol.conformance.cases.case import case
+from protocol.conformance.judgement.rig import Rig
+from protocol.conformance.judgement.verdict import require
+from protocol.conformance.judgement.wire_checks import number
 from protocol.messages import LINE_LIMIT, ErrorCode
 
 _PAUSES_S = (0.5, 6.0)

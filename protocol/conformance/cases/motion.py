@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from math import sqrt
 
-from protocol.conformance.case import case
-from protocol.conformance.reference import Expectation, Sample
-from protocol.conformance.rig import Rig, cruising_speed
-from protocol.conformance.verdict import NonconformityError, require
+from protocol.conformance.cases.case import case
+from protocol.conformance.judgement.reference import Expectation, Sample
+from protocol.conformance.judgement.rig import Rig, cruising_speed
+from protocol.conformance.judgement.verdict import NonconformityError, require
 
 _RAMP_DEG = 5.0
 """From readings of a tenth of a degree, an acceleration can be told over such a way."""

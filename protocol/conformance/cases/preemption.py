@@ -1,7 +1,7 @@
 """Chapter 7.3: a motion that replaces another."""
 
-from protocol.conformance.case import case
-from protocol.conformance.rig import Rig
+from protocol.conformance.cases.case import case
+from protocol.conformance.judgement.rig import Rig
 
 
 @case("7.3/1", travel_deg=30)

@@ -1,9 +1,9 @@
 """Chapters 4.2 and 4.3: `H` and `L` read the position and the latch."""
 
-from protocol.conformance.case import case
-from protocol.conformance.rig import Rig, cruising_speed
-from protocol.conformance.stand import TRIGGER
-from protocol.conformance.verdict import require
+from protocol.conformance.bench.stand import TRIGGER
+from protocol.conformance.cases.case import case
+from protocol.conformance.judgement.rig import Rig, cruising_speed
+from protocol.conformance.judgement.verdict import require
 
 
 @case("4.2/1", travel_deg=10)

@@ -1,11 +1,11 @@
 """Chapter 8: what a client relies on to find its place again."""
 
 from protocol.client import TableClient
-from protocol.conformance.case import case
-from protocol.conformance.reference import Sample
-from protocol.conformance.rig import Rig
-from protocol.conformance.stand import ERROR_REPLIES
-from protocol.conformance.verdict import NonconformityError, require
+from protocol.conformance.bench.stand import ERROR_REPLIES
+from protocol.conformance.cases.case import case
+from protocol.conformance.judgement.reference import Sample
+from protocol.conformance.judgement.rig import Rig
+from protocol.conformance.judgement.verdict import NonconformityError, require
 from protocol.errors import ReplyTimeout, UnexpectedReply
 from protocol.messages import ErrorCode
 

@@ -2,11 +2,11 @@
 
 from decimal import ROUND_HALF_EVEN, Decimal
 
-from protocol.conformance.case import case
-from protocol.conformance.rig import Rig
-from protocol.conformance.stand import OBSERVER, POWER_CYCLE, PRESET, TRIGGER
-from protocol.conformance.verdict import require
-from protocol.conformance.wire_checks import number
+from protocol.conformance.bench.stand import OBSERVER, POWER_CYCLE, PRESET, TRIGGER
+from protocol.conformance.cases.case import case
+from protocol.conformance.judgement.rig import Rig
+from protocol.conformance.judgement.verdict import require
+from protocol.conformance.judgement.wire_checks import number
 
 _ODD_SHARE = 0.9371
 """Of the full speed: a reading's last decimal and a tick's way have no common measure then."""

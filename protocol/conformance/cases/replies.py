@@ -2,11 +2,11 @@
 
 from decimal import ROUND_HALF_EVEN, Decimal
 
-from protocol.conformance.case import case
-from protocol.conformance.rig import Rig
-from protocol.conformance.stand import ERROR_REPLIES, PRESET, STRICT
-from protocol.conformance.verdict import InapplicableError, NonconformityError, require
-from protocol.conformance.wire_checks import number
+from protocol.conformance.bench.stand import ERROR_REPLIES, PRESET, STRICT
+from protocol.conformance.cases.case import case
+from protocol.conformance.judgement.rig import Rig
+from protocol.conformance.judgement.verdict import InapplicableError, NonconformityError, require
+from protocol.conformance.judgement.wire_checks import number
 from protocol.messages import ErrorCode
 
 _KINDS = (b"H ", b"L ", b"OK", b"OK", b"H ", b"OK", b"L ", b"H ", b"ERR 3 ", b"ERR 1 ")

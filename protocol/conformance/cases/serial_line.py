@@ -3,12 +3,12 @@
 from collections.abc import Callable, Iterable, Sequence
 from itertools import cycle, islice
 
-from protocol.conformance.case import case
-from protocol.conformance.ports import is_simulated
-from protocol.conformance.rig import Rig
-from protocol.conformance.stand import ERROR_REPLIES, PACING
-from protocol.conformance.verdict import require
-from protocol.conformance.wire_checks import number
+from protocol.conformance.bench.ports import is_simulated
+from protocol.conformance.bench.stand import ERROR_REPLIES, PACING
+from protocol.conformance.cases.case import case
+from protocol.conformance.judgement.rig import Rig
+from protocol.conformance.judgement.verdict import require
+from protocol.conformance.judgement.wire_checks import number
 from protocol.messages import ErrorCode
 
 _TRAIN = 8

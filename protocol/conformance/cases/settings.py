@@ -1,9 +1,9 @@
 """Chapters 4.6 and 4.7: `S` and `A` set the top speed and the acceleration."""
 
-from protocol.conformance.case import case
-from protocol.conformance.rig import Rig
-from protocol.conformance.stand import DISCONNECT, POWER_CYCLE
-from protocol.conformance.wire_checks import number
+from protocol.conformance.bench.stand import DISCONNECT, POWER_CYCLE
+from protocol.conformance.cases.case import case
+from protocol.conformance.judgement.rig import Rig
+from protocol.conformance.judgement.wire_checks import number
 from protocol.messages import ErrorCode
 
 _OUT_OF_RANGE = ErrorCode.OUT_OF_RANGE

@@ -2,11 +2,11 @@
 
 from math import ceil, floor, sqrt
 
-from protocol.conformance.case import case
-from protocol.conformance.rig import Rig
-from protocol.conformance.stand import PRESET
-from protocol.conformance.verdict import require
-from protocol.conformance.wire_checks import number
+from protocol.conformance.bench.stand import PRESET
+from protocol.conformance.cases.case import case
+from protocol.conformance.judgement.rig import Rig
+from protocol.conformance.judgement.verdict import require
+from protocol.conformance.judgement.wire_checks import number
 from protocol.messages import ErrorCode
 
 _LITTLE_DEG = 0.00049

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from emulator.table import Table
+from emulator.table.table import Table
 from planner.cell.scan import shipped_scans
 from planner.execution.dead_line import judge_dead_line
 from planner.execution.execute import Settings, bring_to, execute

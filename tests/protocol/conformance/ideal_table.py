@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from protocol.conformance.stand import POWER_CYCLE, PRESET, TRIGGER, WireOnly
+from protocol.conformance.bench.stand import POWER_CYCLE, PRESET, TRIGGER, WireOnly
 
 _COMMAND = re.compile(rb"([HL]) *|([PRSA]) *([+-]?[0-9]+(?:\.[0-9]+)?) *")
 _WORDS = ("unknown command", "bad number", "out of range", "line too long", "bad byte")

@@ -12,9 +12,9 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from emulator.protocol_emulator import Serial
-from emulator.table import Table
-from protocol.conformance import suite_run
+from emulator.table.table import Table
 from protocol.conformance.__main__ import main
+from protocol.conformance.commands import suite_run
 
 ROOT = Path(__file__).parents[3]
 TOO_STRICT = "[tolerance]\nspeed_share = 0.0001\n"

@@ -7,13 +7,13 @@ import dataclasses
 
 import pytest
 
-from emulator.config import load_config
-from protocol.conformance.catalogue import all_cases, chosen_cases
-from protocol.conformance.profile import load_profile
-from protocol.conformance.stand import STRICT, InProcess
-from protocol.conformance.suite import Outcome, Session, SessionError
-from protocol.conformance.verdict import Verdict
-from protocol.conformance.wire import RecordedPort
+from emulator.config.table_config import load_config
+from protocol.conformance.bench.stand import STRICT, InProcess
+from protocol.conformance.bench.wire import RecordedPort
+from protocol.conformance.cases.catalogue import all_cases, chosen_cases
+from protocol.conformance.judgement.verdict import Verdict
+from protocol.conformance.profile.profile import load_profile
+from protocol.conformance.session.suite import Outcome, Session, SessionError
 from tests.protocol.conformance.mutants import MUTANTS, Mutant, port_to
 
 CATCHES_NONE = {

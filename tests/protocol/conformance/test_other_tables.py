@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from protocol.conformance.catalogue import all_cases, chosen_cases
-from protocol.conformance.profile import load_profile
-from protocol.conformance.stand import Stand, WireOnly
-from protocol.conformance.suite import Outcome, Session
-from protocol.conformance.verdict import Verdict
-from protocol.conformance.wire import RecordedPort
+from protocol.conformance.bench.stand import Stand, WireOnly
+from protocol.conformance.bench.wire import RecordedPort
+from protocol.conformance.cases.catalogue import all_cases, chosen_cases
+from protocol.conformance.judgement.verdict import Verdict
+from protocol.conformance.profile.profile import load_profile
+from protocol.conformance.session.suite import Outcome, Session
 from tests.protocol.conformance.ideal_table import IdealPort, IdealTable, Make
 
 

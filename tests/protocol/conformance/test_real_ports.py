@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from protocol.conformance.ports import SessionError, open_port
-from protocol.conformance.profile import load_profile
+from protocol.conformance.bench.ports import SessionError, open_port
+from protocol.conformance.profile.profile import load_profile
 
 SHORT = ("2.2/1", "3.1/5", "5.1/2", "6.2/2:power-on", "6.1/5", "7.3/3:near")
 COMMAND = [sys.executable, "-m", "protocol.conformance", "--yes"]
@@ -77,7 +77,7 @@ def test_ctrl_c_and_a_polite_kill_stop_the_table_and_leave_the_record(
 
 
 def test_a_polite_kill_of_pytest_stops_the_table_too(stand_in: StandIn, tmp_path: Path) -> None:
-    plugin = ["-p", "no:cacheprovider", "-p", "protocol.conformance.pytest_plugin"]
+    plugin = ["-p", "no:cacheprovider", "-p", "protocol.conformance.pytest.plugin"]
     table = ["--table-port", stand_in.port, "--table-control", str(stand_in.control), "--table-yes"]
     command = [sys.executable, "-m", "pytest", *plugin, "--pyargs", "protocol.conformance", *table, "-k", "4.2/3"]
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}

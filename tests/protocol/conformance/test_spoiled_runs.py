@@ -3,14 +3,14 @@
 import dataclasses
 
 from emulator.protocol_emulator import Serial
-from protocol.conformance.case import Case
-from protocol.conformance.catalogue import chosen_cases
-from protocol.conformance.profile import load_profile
-from protocol.conformance.rig import Rig
-from protocol.conformance.stand import InProcess
-from protocol.conformance.suite import Outcome, Session
-from protocol.conformance.verdict import Verdict
-from protocol.conformance.wire import RecordedPort
+from protocol.conformance.bench.stand import InProcess
+from protocol.conformance.bench.wire import RecordedPort
+from protocol.conformance.cases.case import Case
+from protocol.conformance.cases.catalogue import chosen_cases
+from protocol.conformance.judgement.rig import Rig
+from protocol.conformance.judgement.verdict import Verdict
+from protocol.conformance.profile.profile import load_profile
+from protocol.conformance.session.suite import Outcome, Session
 from tests.protocol.conformance.mutants import Mutant, port_to
 
 

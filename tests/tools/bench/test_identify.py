@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from emulator.config import load_config
+from emulator.config.table_config import load_config
 from tools.bench.identify_tables import BACKLASH_ARCMIN, SPREAD, random_plant, write_plant
 
 

@@ -5,7 +5,7 @@ import pytest
 import serial
 
 import emulator  # noqa: F401  # teaches pyserial the port emulator://
-from emulator.config import TableConfig, load_config
+from emulator.config.table_config import TableConfig, load_config
 from emulator.protocol_emulator import Serial
 from protocol.client import TableClient
 from tools.identification.excitation import excitation

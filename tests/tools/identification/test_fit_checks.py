@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emulator.config import TableConfig, load_config
+from emulator.config.table_config import TableConfig, load_config
 from tools.emulated import Array
 from tools.identification.errors import RecordingError
 from tools.identification.estimation import Estimate, Half

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 import emulator  # noqa: F401  # teaches pyserial the port emulator://
-from emulator.config import TableConfig, load_config
+from emulator.config.table_config import TableConfig, load_config
 from protocol.client import TableClient
 from tools.bench.identify_tables import write_plant
 from tools.emulated import Motion, emulate

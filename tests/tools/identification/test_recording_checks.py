@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.emulated import Array
 from tools.identification.errors import RecordingError
 from tools.identification.recording import DriveRecording, Sent, WireRecording

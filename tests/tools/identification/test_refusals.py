@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import serial
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from emulator.protocol_emulator import Serial
 from protocol.client import TableClient
 from tools.emulated import Array

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.emulated import Array, Motion, emulate, motion_rows
 from tools.identification.simulation import Standstill, wire_positions_deg
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.emulated import Array
 from tools.identification.recording import WireRecording
 from tools.identification.timing import Timing, timing

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from emulator.config import DiscConfig, GainsConfig, MotionConfig, load_config
+from emulator.config.table_config import DiscConfig, GainsConfig, MotionConfig, load_config
 from tools.emulated import with_gains
 from tools.tuning.check import Check, Curve, Figure
 from tools.tuning.checks import all_checks, differences, differs

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emulator.config import load_config
+from emulator.config.table_config import load_config
 from tools.tuning.bounds import Bound, Limits, violation
 from tools.tuning.gain_design import LEAST_LAG, LEAST_LOAD_PEAK, Objective, design, relaxations
 from tools.tuning.loop_figures import Loops, loop_figures

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from emulator.config import TableConfig, load_config
-from emulator.pid import Gains, fixed_gains
+from emulator.config.constants import fixed_gains
+from emulator.config.table_config import TableConfig, load_config
+from emulator.firmware.pid import Gains
 from tools.emulated import with_gains
 from tools.tuning.gain_files import gains_config, gains_header, gains_toml
 

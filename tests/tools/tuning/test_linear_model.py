@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from emulator import drive_train
-from emulator.config import TableConfig, load_config
-from emulator.pid import fixed_gains
+from emulator.config.constants import drive_constants, fixed_gains
+from emulator.config.table_config import TableConfig, load_config
+from emulator.plant import drive_train
 from tools.emulated import Array
 from tools.tuning.frequency_response import grid_z, plant_response
 from tools.tuning.linear_model import Teeth, closed_loop, duty_gains, plant, regulator, speed_gain_deg_s
@@ -26,7 +26,7 @@ def frictionless(backlash_arcmin: float) -> TableConfig:
 
 def emulated_answer(config: TableConfig, reference_deg_s: Array, load_Nm: Array) -> Array:
     """Close the firmware's loop, in real numbers, about the emulator's plant; return the speed after each tick."""
-    train = drive_train.drive_train(config)
+    train = drive_constants(config)
     state = drive_train.at_standstill(train, 0.0)
     proportional, integral, derivative = duty_gains(config, fixed_gains(config, config.gains.hold))
     window, tick_hz = config.control.speed_window_ticks, config.control.tick_hz

@@ -12,8 +12,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete
 
-from emulator.config import TableConfig, load_config
-from emulator.pid import Gains, fixed_gains
+from emulator.config.constants import fixed_gains
+from emulator.config.table_config import TableConfig, load_config
+from emulator.firmware.pid import Gains
 from tools.tuning.loop_figures import Loops, loop_figures
 
 Array = NDArray[np.float64]

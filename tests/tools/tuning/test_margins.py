@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from emulator.config import load_config
-from emulator.pid import Gains, fixed_gains
+from emulator.config.constants import fixed_gains
+from emulator.config.table_config import load_config
+from emulator.firmware.pid import Gains
 from tools.tuning.frequency_response import PlantResponse, grid_hz, grid_z, plant_response
 from tools.tuning.linear_model import Teeth, closed_loop, duty_gains, plant, quantisation_noise
 from tools.tuning.loop_figures import step_answer

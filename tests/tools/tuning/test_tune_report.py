@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from emulator.config import load_config
+from emulator.config.table_config import load_config
 from tools.tuning.bounds import Limits
 from tools.tuning.checks import Difference
 from tools.tuning.tune_plots import plots

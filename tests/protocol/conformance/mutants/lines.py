@@ -3,9 +3,9 @@
 import re
 from collections.abc import Callable
 
-from emulator.config import TableConfig
-from emulator.faults import fault_from
-from emulator.uart import Uart
+from emulator.config.table_config import TableConfig
+from emulator.faults.fault import fault_from
+from emulator.line.uart import Uart
 from protocol.line_buffer import LineBuffer
 from protocol.messages import ErrorCode
 from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by

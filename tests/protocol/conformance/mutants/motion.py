@@ -3,7 +3,7 @@
 from decimal import Decimal
 from math import isqrt
 
-from emulator.fixed_point import POSITION_BITS
+from emulator.firmware.fixed_point import POSITION_BITS
 from protocol.messages import Command, Verb
 from tests.protocol.conformance.mutants.mutant import MOTIONS, Line, Mutant, Rereads, caught_by, value_of
 

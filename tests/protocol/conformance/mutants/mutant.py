@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from decimal import Decimal
 
-from emulator.config import TableConfig, load_config
-from emulator.firmware import MOVING, SETTLING
-from emulator.fixed_point import POSITION_BITS
-from emulator.profiler import Profile
+from emulator.config.table_config import TableConfig, load_config
+from emulator.firmware.controller import MOVING, SETTLING
+from emulator.firmware.fixed_point import POSITION_BITS
+from emulator.firmware.profiler import Profile
 from emulator.protocol_emulator import Serial
-from emulator.table import Table
+from emulator.table.table import Table
 from protocol.messages import Command, ErrorCode, Verb
 
 Line = Command | ErrorCode

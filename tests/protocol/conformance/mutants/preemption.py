@@ -1,6 +1,6 @@
 """Wrong tables: a motion that replaces another."""
 
-from emulator.fixed_point import SPEED_BITS
+from emulator.firmware.fixed_point import SPEED_BITS
 from protocol.messages import Command, Verb
 from tests.protocol.conformance.mutants.mutant import MOTIONS, Line, Mutant, Rereads, caught_by, value_of, verb_of
 

@@ -1,6 +1,6 @@
 """Wrong tables: the number, order and words of replies."""
 
-from emulator.firmware import IDLE
+from emulator.firmware.controller import IDLE
 from protocol.codec import encode_reply
 from protocol.messages import ErrorCode, Refusal, Verb
 from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by, verb_of

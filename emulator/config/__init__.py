@@ -1,0 +1,1 @@
+"""The constants of a table, read from TOML."""

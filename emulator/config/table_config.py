@@ -1,0 +1,253 @@
+"""The table's constants: one frozen value per section of the TOML file, each number with its unit and its range.
+
+The numbers themselves, and where each comes from, are in `default.toml`.
+"""
+
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Self
+
+from emulator.config.toml_section import ConfigError, merged, quantity, section
+from emulator.faults.fault import Fault, FaultError, fault_from
+from emulator.faults.parameter import brief
+from emulator.firmware.fixed_point import SPEED_BITS, gain_registers
+from protocol.data_file import DataFileError, read_toml
+
+DEFAULT_FILE = Path(__file__).with_name("default.toml")
+
+
+@dataclass(frozen=True)
+class MotorConfig:
+    """The DC motor, from its datasheet."""
+
+    resistance_ohm: float = quantity(least=1e-3, most=1e4)
+    inductance_H: float = quantity(least=1e-6, most=10)
+    torque_constant_Nm_A: float = quantity(least=1e-6, most=100)
+    rotor_inertia_kg_m2: float = quantity(least=1e-10, most=10)
+
+
+@dataclass(frozen=True)
+class DriverConfig:
+    """The PWM bridge."""
+
+    supply_V: float = quantity(above=0, most=1000)
+    pwm_bits: int = quantity(least=4, most=11)
+
+    @property
+    def duty_max(self) -> int:
+        """PWM steps at full duty."""
+        return (1 << self.pwm_bits) - 1
+
+
+@dataclass(frozen=True)
+class GearsConfig:
+    """The spur gear chain between motor and table."""
+
+    ratio: float = quantity(least=1, most=1e5)
+    efficiency: float = quantity(least=0.01, most=1)
+    inertia_kg_m2: float = quantity(least=0, most=10)
+    backlash_arcmin: float = quantity(least=0, most=600)
+
+
+@dataclass(frozen=True)
+class DiscConfig:
+    """The table's disc with the workpiece on it."""
+
+    inertia_kg_m2: float = quantity(least=1e-9, most=1e6)
+    bearing_friction_Nm: float = quantity(least=0, most=1e5)
+
+
+@dataclass(frozen=True)
+class FrictionConfig:
+    """Friction of motor and gears at the motor's shaft."""
+
+    coulomb_Nm: float = quantity(least=0, most=1e3)
+    stiction_ratio: float = quantity(least=1, most=10)
+    stribeck_speed_rad_s: float = quantity(least=1e-3, most=1e4)
+    viscous_Nm_s: float = quantity(least=0, most=1)
+
+
+@dataclass(frozen=True)
+class EncoderConfig:
+    """The quadrature encoder on the motor's shaft."""
+
+    lines: int = quantity(least=1, most=10_000)
+
+
+@dataclass(frozen=True)
+class ControlConfig:
+    """The firmware's clock and speed estimate."""
+
+    tick_hz: int = quantity(least=100, most=100_000)
+    speed_window_ticks: int = quantity(least=1, most=64)
+
+
+@dataclass(frozen=True)
+class GainsConfig:
+    """One PID gain set: u = K (e + integral(e) / Ti - Td d(omega)/dt), e in deg/s, u = 1 at full duty."""
+
+    proportional_duty_s_deg: float = quantity(least=0, most=1e6)
+    integral_time_s: float = quantity(least=1e-6, most=1e6)
+    derivative_time_s: float = quantity(least=0, most=1e3)
+
+
+@dataclass(frozen=True)
+class GainSetsConfig:
+    """The two gain sets of section 2.1 of the paper: following a ramp, and holding a speed."""
+
+    ramp: GainsConfig
+    hold: GainsConfig
+
+
+@dataclass(frozen=True)
+class SettlingConfig:
+    """How the table is brought to its target once the profile has ended."""
+
+    arrival_count: int = quantity(least=0, most=100)
+    arrival_time_s: float = quantity(least=0, most=10)
+    approach_rate_1_s: float = quantity(above=0, most=100)
+    approach_speed_deg_s: float = quantity(above=0, most=1e6)
+
+
+@dataclass(frozen=True)
+class ProtectionConfig:
+    """When a motor that does not turn is switched off."""
+
+    stall_duty: float = quantity(above=0, most=1)
+    stall_time_s: float = quantity(above=0, most=3600)
+    settling_time_s: float = quantity(above=0, most=3600)
+
+
+@dataclass(frozen=True)
+class MotionConfig:
+    """A speed and an acceleration of the table."""
+
+    speed_deg_s: float = quantity(above=0, most=1e6)
+    acceleration_deg_s2: float = quantity(above=0, most=1e9)
+
+
+@dataclass(frozen=True)
+class SerialConfig:
+    """The serial line."""
+
+    baud: int = quantity(least=0, most=4_000_000)
+    decimals: int = quantity(least=1, most=6)
+    strict: bool = quantity()
+
+
+@dataclass(frozen=True)
+class TableConfig:
+    """Every constant of the table. The file of each default value states its source."""
+
+    motor: MotorConfig
+    driver: DriverConfig
+    gears: GearsConfig
+    table: DiscConfig
+    friction: FrictionConfig
+    encoder: EncoderConfig
+    control: ControlConfig
+    gains: GainSetsConfig
+    settling: SettlingConfig
+    protection: ProtectionConfig
+    limits: MotionConfig
+    power_on: MotionConfig
+    serial: SerialConfig
+    faults: tuple[Fault, ...] = ()  # [[faults]] of a file; none are shipped
+
+    @property
+    def counts_per_turn(self) -> float:
+        """Encoder counts in one turn of the table: quadrature counts each line four times."""
+        return 4 * self.encoder.lines * self.gears.ratio
+
+    def gains_per_tick(self, gains: GainsConfig) -> tuple[float, float, float]:
+        """Return K, K / Ti and K Td as one tick applies them: PWM steps for a speed error of one count a window."""
+        tick_s = 1.0 / self.control.tick_hz
+        error_unit_deg_s = 360.0 / self.counts_per_turn / (self.control.speed_window_ticks * tick_s)
+        gain = gains.proportional_duty_s_deg * self.driver.duty_max * error_unit_deg_s
+        return gain, gain * tick_s / gains.integral_time_s, gain * gains.derivative_time_s / tick_s
+
+    def with_serial(self, **changes: int | bool | None) -> Self:
+        """Return this table with other serial settings; a setting that is None stays as it is.
+
+        Raises:
+            ConfigError: A setting is outside its range.
+        """
+        serial = self.serial
+        chosen = {key: value for key, value in changes.items() if value is not None}
+        values = {entry.name: getattr(serial, entry.name) for entry in fields(serial)} | chosen
+        return replace(self, serial=section(SerialConfig, values, "serial settings", "serial"))
+
+
+def load_config(path: str | Path | None = None) -> TableConfig:
+    """Read a table's constants: the shipped defaults, with those of the file at `path` over them.
+
+    Raises:
+        ConfigError: The file cannot be read, or a key, a type, a range or a combination is wrong.
+    """
+    defaults = _read(DEFAULT_FILE)
+    source = DEFAULT_FILE.name if path is None else str(path)
+    changes = {} if path is None else _read(Path(path))
+    faults = _faults(changes.pop("faults", []), f"{source}: faults")
+    values = merged(defaults, changes, source) | {"faults": faults}
+    config: TableConfig = section(TableConfig, values, source)
+    _check_together(config, source)
+    return config
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return read_toml(path)
+    except DataFileError as error:
+        raise ConfigError(str(error)) from error
+
+
+def _faults(entries: object, where: str) -> tuple[Fault, ...]:
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise ConfigError(f"{where} is {brief(entries)}; each fault is a table of its own, [[faults]]")
+    try:
+        return tuple(
+            fault_from(entry.get("fault"), {key: value for key, value in entry.items() if key != "fault"})
+            for entry in entries
+        )
+    except FaultError as error:
+        raise ConfigError(f"{where}: {error}") from error
+
+
+def _check_together(config: TableConfig, source: str) -> None:
+    for name in ("speed_deg_s", "acceleration_deg_s2"):
+        start, limit = getattr(config.power_on, name), getattr(config.limits, name)
+        if start > limit:
+            raise ConfigError(f"{source}: power_on.{name} is {start:g}; it must be at most limits.{name}, {limit:g}")
+    if not config.counts_per_turn.is_integer():
+        raise ConfigError(
+            f"{source}: gears.ratio is {config.gears.ratio!r}; with encoder.lines {config.encoder.lines} "
+            "it must give a whole number of counts a turn"
+        )
+    _check_registers(config, source)
+
+
+def _check_registers(config: TableConfig, source: str) -> None:
+    """Refuse what does not fit the firmware's number formats; see `fixed_point`."""
+    count_deg, tick_hz = config.counts_per_turn / 360.0, config.control.tick_hz
+    unit = 2.0**-SPEED_BITS
+    # A speed register ends at 32 counts a tick, and the sum of a speed and an acceleration must fit too.
+    speeds_deg_s = (unit * tick_hz / count_deg, 31.0 * tick_hz / count_deg)
+    accelerations_deg_s2 = (unit * tick_hz**2 / count_deg, tick_hz**2 / count_deg)
+    held = (
+        ("limits.speed_deg_s", config.limits.speed_deg_s, speeds_deg_s),
+        ("limits.acceleration_deg_s2", config.limits.acceleration_deg_s2, accelerations_deg_s2),
+        ("power_on.speed_deg_s", config.power_on.speed_deg_s, speeds_deg_s),
+        ("power_on.acceleration_deg_s2", config.power_on.acceleration_deg_s2, accelerations_deg_s2),
+        ("settling.approach_speed_deg_s", config.settling.approach_speed_deg_s, speeds_deg_s),
+    )
+    for name, value, (least, most) in held:
+        if not least <= value <= most:
+            raise ConfigError(
+                f"{source}: {name} is {value:g}; with this encoder and tick the firmware holds {least:g} to {most:g}"
+            )
+    for name in ("ramp", "hold"):
+        gains = getattr(config.gains, name)
+        try:
+            gain_registers(*config.gains_per_tick(gains))
+        except OverflowError as error:
+            raise ConfigError(f"{source}: gains.{name}: {gains} does not fit the firmware: {error}") from None

@@ -1,0 +1,88 @@
+"""A section of a TOML file as a frozen value: each number of its type and within its range.
+
+A section is a dataclass whose fields are declared with `quantity`, or are sections themselves.
+"""
+
+import math
+from dataclasses import field, fields, is_dataclass
+from typing import Any, get_type_hints
+
+from emulator.faults.parameter import brief
+from protocol.data_file import did_you_mean
+
+
+class ConfigError(ValueError):
+    """A configuration that cannot be used; the message names the file, the key and what is allowed."""
+
+
+def quantity(*, above: float | None = None, least: float | None = None, most: float | None = None) -> Any:  # noqa: ANN401  # stands for a value of the annotated type
+    """Declare a number that must be > `above`, >= `least` and <= `most`."""
+    return field(metadata={"above": above, "least": least, "most": most})
+
+
+def merged(defaults: dict[str, Any], changes: dict[str, Any], source: str, where: str = "") -> dict[str, Any]:
+    """Return the defaults with changes over them.
+
+    Args:
+        defaults: All keys that there are.
+        changes: What another file says, with any of those keys.
+        source: The other file, for what is said of it.
+        where: The section's name with a point, empty at the top.
+
+    Raises:
+        ConfigError: A key is unknown, or no section where one is needed.
+    """
+    result = dict(defaults)
+    for key, value in changes.items():
+        if key not in defaults:
+            raise ConfigError(
+                f"{source}: {where}{key[:60]} is not a key; allowed here are {', '.join(defaults)}"
+                f"{did_you_mean(key[:60], defaults)}"
+            )
+        nested = isinstance(defaults[key], dict)
+        if nested and not isinstance(value, dict):
+            raise ConfigError(f"{source}: {where + key} must be a section, not {brief(value)}")
+        result[key] = merged(defaults[key], value, source, f"{where}{key}.") if nested else value
+    return result
+
+
+def section(kind: type[Any], values: dict[str, Any], source: str, where: str = "") -> Any:  # noqa: ANN401  # an instance of `kind`
+    """Return a section of a kind; values that are tuples are taken as they are.
+
+    Raises:
+        ConfigError: A number is of another type or outside of its range.
+    """
+    types = get_type_hints(kind)
+    arguments: dict[str, Any] = {}
+    for entry in fields(kind):
+        name = f"{where}.{entry.name}" if where else entry.name
+        wanted, value = types[entry.name], values[entry.name]
+        if isinstance(value, tuple):
+            arguments[entry.name] = value  # looked at before
+        elif is_dataclass(wanted):
+            arguments[entry.name] = section(wanted, value, source, name)  # type: ignore[arg-type]  # a dataclass's type
+        else:
+            arguments[entry.name] = _number(wanted, value, entry.metadata, f"{source}: {name}")
+    constructor: Any = kind
+    return constructor(**arguments)
+
+
+def _number(wanted: type, value: object, limits: Any, where: str) -> float | int | bool:  # noqa: ANN401  # a field's metadata
+    if wanted is bool or isinstance(value, bool):
+        if wanted is bool and isinstance(value, bool):
+            return value
+        raise ConfigError(f"{where} is {brief(value)}; it must be {'true or false' if wanted is bool else 'a number'}")
+    if not isinstance(value, int if wanted is int else (int, float)):
+        raise ConfigError(f"{where} is {brief(value)}; it must be a {'whole number' if wanted is int else 'number'}")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ConfigError(f"{where} is {brief(value)}; it must be finite")
+    above, least, most = (limits[key] for key in ("above", "least", "most"))
+    broken = (
+        (above is not None and value <= above, f"greater than {above}"),
+        (least is not None and value < least, f"at least {least}"),
+        (most is not None and value > most, f"at most {most}"),
+    )
+    for is_broken, allowed in broken:
+        if is_broken:
+            raise ConfigError(f"{where} is {brief(value)}; it must be {allowed}")
+    return wanted(value)  # type: ignore[no-any-return]  # int or float

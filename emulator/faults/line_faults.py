@@ -1,0 +1,78 @@
+"""What faults do to the serial line: to the bytes on their way, and to the replies before they are sent."""
+
+from collections import deque
+
+from emulator.faults.schedule import FaultSchedule
+from emulator.line.framing import read_at_rate
+
+TO_TABLE, TO_CLIENT = 1, -1
+"""The direction of bytes, as a fault's parameter `direction` names it; there 0 is both."""
+
+
+class LineFaults:
+    """Loses, changes and holds back what passes the line, as the faults that hold want it."""
+
+    def __init__(self, baud: int, tick_hz: int, faults: FaultSchedule) -> None:
+        """Start with nothing held back, on a line of a baud rate (0: not paced) and for a firmware's clock."""
+        self._faults = faults
+        self._baud = baud
+        self._tick_hz = tick_hz
+        self._held: deque[tuple[int, bytes]] = deque()  # each with the tick at which it goes on
+
+    @property
+    def are_present(self) -> bool:
+        """Whether any fault holds or is to come."""
+        return self._faults.present
+
+    @property
+    def held_until(self) -> int | None:
+        """The tick at which replies that are held back go on; None where there are none."""
+        return self._held[0][0] if self._held else None
+
+    def on_the_line(self, data: bytes, direction: int) -> bytes:
+        """Return what becomes of bytes on their way to the table or to the client."""
+        faults = self._faults
+        if not faults.present:
+            return data
+        if faults.hangs_up or (direction == TO_CLIENT and faults.holding("silence")):
+            return b""
+        if (fault := faults.holding("wrong-baud")) and self._baud:
+            table_baud = int(fault.value("baud"))
+            sender, receiver = (self._baud, table_baud) if direction == TO_TABLE else (table_baud, self._baud)
+            data = read_at_rate(data, sender, receiver)
+        if (fault := faults.holding("drop")) and fault.value("direction") in {0.0, direction}:
+            data = bytes(byte for byte in data if not faults.strikes(fault.value("probability")))
+        if (fault := faults.holding("flip")) and fault.value("direction") in {0.0, direction}:
+            data = bytes(self._flipped(byte, fault.value("probability")) for byte in data)
+        return data
+
+    def on_a_reply(self, reply: bytes, tick: int) -> bytes:
+        """Return what the table sends of a reply now; the rest is lost, or held back."""
+        faults = self._faults
+        if not (faults.present or self._held):
+            return reply
+        if fault := faults.spent("half-reply"):
+            reply = reply[: int(fault.value("bytes"))]
+        late_s = fault.value("seconds") if (fault := faults.spent("late-reply")) else 0.0
+        if fault := faults.holding("delay"):
+            late_s += fault.value("seconds")
+        # A reply never overtakes the one before it.
+        due = max(tick + round(late_s * self._tick_hz), self._held[-1][0] if self._held else tick)
+        if due == tick:
+            return reply
+        self._held.append((due, reply))
+        return b""
+
+    def released(self, tick: int) -> bytes:
+        """Return the replies whose time has come."""
+        data = b""
+        while self._held and self._held[0][0] <= tick:
+            data += self._held.popleft()[1]
+        return data
+
+    def disconnect(self) -> None:
+        """Forget what is held back: the client has gone."""
+        self._held.clear()
+
+    def _flipped(self, byte: int, probability: float) -> int:
+        return byte ^ 1 << self._faults.chance.randrange(8) if self._faults.strikes(probability) else byte

@@ -1,0 +1,128 @@
+"""Which faults of a table hold: each begins at its time or its command, and ends with its time or when it is cleared.
+
+What a fault does while it holds is in `line_faults`, `drive_faults` and `trigger_faults`. Their chance comes from here
+and is seeded: the same faults strike the same bytes at the same ticks.
+"""
+
+from collections.abc import Iterable
+from random import Random
+from typing import NamedTuple
+
+from emulator.faults.fault import KINDS, Fault, FaultError
+
+MOST_PLANS = 1000
+"""Faults that may wait at once: each is looked at whenever one begins."""
+
+
+class Plan(NamedTuple):
+    """A fault that waits for its time or its command, with the ticks that it lasts."""
+
+    fault: Fault
+    begin_tick: int | None
+    ticks: int | None
+
+
+class Active(NamedTuple):
+    """A fault that holds, until a tick or until it is cleared."""
+
+    fault: Fault
+    end_tick: int | None
+
+
+class FaultSchedule:
+    """The faults of one table: those to come, and those that hold, at most one of a kind.
+
+    Attributes:
+        chance: where the faults' effects draw from.
+    """
+
+    def __init__(self, faults: Iterable[Fault], tick_hz: int, seed: int) -> None:
+        """Take the faults of a configuration; one without a beginning holds from the start."""
+        self.chance = Random(f"faults {seed}")  # noqa: S311  # no secret
+        self._tick_hz = tick_hz
+        self._plans: list[Plan] = []
+        self._active: dict[str, Active] = {}
+        self._lines_heard = 0
+        for fault in faults:
+            self.inject(fault, 0)
+
+    @property
+    def present(self) -> bool:
+        """Whether any fault holds or is to come."""
+        return bool(self._plans or self._active)
+
+    @property
+    def hangs_up(self) -> bool:
+        """Whether the port has gone away."""
+        return "hang-up" in self._active
+
+    @property
+    def next_tick(self) -> int | None:
+        """The tick at which a fault begins or ends; None where no such tick is known."""
+        ticks = [plan.begin_tick for plan in self._plans] + [one.end_tick for one in self._active.values()]
+        return min((tick for tick in ticks if tick is not None), default=None)
+
+    def inject(self, fault: Fault, tick: int) -> bool:
+        """Add a fault, which replaces one of its kind that holds, from its beginning or else from now on.
+
+        Returns:
+            Whether the port goes away with this, as after `begin_tick` and `begin_line`.
+
+        Raises:
+            FaultError: too many wait already.
+        """
+        if len(self._plans) >= MOST_PLANS:
+            raise FaultError(f"{MOST_PLANS} faults wait for their beginning; no more are taken until some have begun")
+        begin = None if fault.at_command is not None else tick
+        if fault.at_s is not None:
+            begin = max(round(fault.at_s * self._tick_hz), tick)
+        ticks = None if fault.for_s is None else max(1, round(fault.for_s * self._tick_hz))
+        self._plans.append(Plan(fault, begin, ticks))
+        return self.begin_tick(tick)
+
+    def clear(self) -> None:
+        """End all faults, and forget those to come."""
+        self._plans.clear()
+        self._active.clear()
+
+    def begin_tick(self, tick: int) -> bool:
+        """End the faults that are over, and begin those that are due; return whether the port goes away with this."""
+        if not self.present:
+            return False
+        was_up = not self.hangs_up
+        for kind in [kind for kind, one in self._active.items() if one.end_tick is not None and one.end_tick <= tick]:
+            del self._active[kind]
+        self._begin([plan for plan in self._plans if plan.begin_tick is not None and plan.begin_tick <= tick], tick)
+        return was_up and self.hangs_up
+
+    def begin_line(self, tick: int) -> bool:
+        """Count a line that the firmware has heard, and begin the faults that wait for it; return as `begin_tick`."""
+        self._lines_heard += 1
+        was_up = not self.hangs_up
+        self._begin([plan for plan in self._plans if plan.fault.at_command == self._lines_heard], tick)
+        return was_up and self.hangs_up
+
+    def holds_any(self, kinds: frozenset[str]) -> bool:
+        """Return whether a fault of one of these kinds holds."""
+        return not kinds.isdisjoint(self._active)
+
+    def holding(self, kind: str) -> Fault | None:
+        """Return the fault of a kind that holds, if there is one."""
+        one = self._active.get(kind)
+        return None if one is None else one.fault
+
+    def spent(self, kind: str) -> Fault | None:
+        """Return a fault that strikes once, which is over with this."""
+        assert KINDS[kind].strikes_once
+        one = self._active.pop(kind, None)
+        return None if one is None else one.fault
+
+    def strikes(self, probability: float) -> bool:
+        """Draw whether a fault strikes this time."""
+        return self.chance.random() < probability
+
+    def _begin(self, plans: list[Plan], tick: int) -> None:
+        for plan in plans:
+            self._plans.remove(plan)
+            end = None if plan.ticks is None else tick + plan.ticks
+            self._active[plan.fault.kind] = Active(plan.fault, end)

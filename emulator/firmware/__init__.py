@@ -1,0 +1,1 @@
+"""The controller's program: fixed-point numbers, profiler, PID, and what they do at each tick."""

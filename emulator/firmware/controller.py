@@ -1,0 +1,127 @@
+"""The controller's tick: profiler, speed estimate, PID, and the protection of the motor.
+
+A motion runs through these states:
+
+    IDLE     the drive is off; friction holds the table
+    MOVING   the profile runs, the PID follows its speed
+    SETTLING the profile has ended; the table creeps until the encoder has stayed at the target for a while, then IDLE
+    STALLED  the motor was driven but the encoder stood still: the drive is off until the next motion
+"""
+
+from typing import NamedTuple
+
+from emulator.firmware.fixed_point import ERROR_BITS, POSITION_BITS, SPEED_BITS, clamp
+from emulator.firmware.pid import HOLD, RAMP, Pid, PidState, switched_off
+from emulator.firmware.pid import step as pid_step
+from emulator.firmware.profiler import Profile, Reference, at_rest, retarget, standing_at
+from emulator.firmware.profiler import step as profiler_step
+from emulator.int32 import wrap_int32
+
+IDLE = 0
+MOVING = 1
+SETTLING = 2
+STALLED = 3
+DRIVE_OFF = (IDLE, STALLED)
+
+STATE_NAMES = ("idle", "moving", "settling", "stalled")
+
+_DEMAND_SHIFT = SPEED_BITS - ERROR_BITS
+
+
+class Firmware(NamedTuple):
+    """The controller's constants, in its own formats."""
+
+    pid: Pid
+    window_ticks: int  # over which the speed is measured
+    arrival_count: int  # this near is at the target
+    arrival_ticks: int  # once it has been there for so long
+    approach_rate: int  # of speed over remaining distance, per tick; 26 fraction bits
+    approach_speed: int  # count/tick, 26 fraction bits
+    stall_duty: int  # PWM steps; a motor driven so hard must turn
+    stall_ticks: int  # within this time
+    settling_ticks: int  # the longest that settling may take
+
+
+class FirmwareState(NamedTuple):
+    """The controller's memory."""
+
+    motion: int  # IDLE, MOVING, SETTLING or STALLED
+    profile: Profile
+    reference: Reference
+    counts: tuple[int, ...]  # of the last ticks, oldest first, as many as the speed window
+    pid: PidState
+    still_ticks: int  # driven hard without a change of the count
+    settling_ticks: int  # since the profile ended
+    arrived_ticks: int  # within the arrival window without a break
+
+
+def power_on(parameters: Firmware, profile: Profile, count: int) -> FirmwareState:
+    """Return the controller as it wakes: at rest where the encoder stands."""
+    return FirmwareState(
+        motion=IDLE,
+        profile=profile,
+        reference=standing_at(count),
+        counts=(count,) * parameters.window_ticks,
+        pid=PidState(0, 0, HOLD, 0),
+        still_ticks=0,
+        settling_ticks=0,
+        arrived_ticks=0,
+    )
+
+
+def begin_motion(state: FirmwareState, profile: Profile, distance: int) -> FirmwareState:
+    """Return the controller with a new target, `distance` (26 fraction bits) from the reference.
+
+    The reference goes on from its present position and speed; that of a table that stalled is where it stands.
+    """
+    return FirmwareState(MOVING, profile, retarget(state.reference, distance), state.counts, state.pid, 0, 0, 0)
+
+
+def distance_to(reference: Reference, target: int) -> int:
+    """Return the way to an absolute position; both with 26 fraction bits, neither modulo a turn."""
+    return target - (reference.position_count << POSITION_BITS) - reference.fraction
+
+
+def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareState:
+    """Return the controller after one tick, at the end of which the encoder's counter reads `count`."""
+    motion, profile, reference, counts, regulator, still_ticks, settling_ticks, arrived_ticks = state
+    measured = wrap_int32(count - counts[0])
+    last_count = counts[-1]
+    counts = (*counts[1:], count)
+    if motion in DRIVE_OFF:
+        return _drive_off(motion, profile, reference, counts, switched_off(regulator, measured))
+
+    if motion == MOVING:
+        last_speed = reference.speed
+        reference = profiler_step(profile, reference)
+        demand = reference.speed
+        gain_set = HOLD if reference.speed == last_speed else RAMP
+        if at_rest(reference):
+            motion = SETTLING
+    else:
+        remaining = position_error(reference, count)
+        arrived_ticks = arrived_ticks + 1 if abs(remaining) <= parameters.arrival_count else 0
+        if arrived_ticks >= parameters.arrival_ticks:
+            return _drive_off(IDLE, profile, reference, counts, switched_off(regulator, measured))
+        demand = 0 if arrived_ticks else clamp(remaining * parameters.approach_rate, parameters.approach_speed)
+        gain_set = HOLD
+        settling_ticks += 1
+
+    window_demand = (demand * parameters.window_ticks) >> _DEMAND_SHIFT
+    regulator = pid_step(parameters.pid, regulator, gain_set, window_demand, measured)
+    still = count == last_count and abs(regulator.duty) >= parameters.stall_duty
+    still_ticks = still_ticks + 1 if still else 0
+    if still_ticks >= parameters.stall_ticks or settling_ticks >= parameters.settling_ticks:
+        return _drive_off(STALLED, profile, standing_at(count), counts, switched_off(regulator, measured))
+    return FirmwareState(motion, profile, reference, counts, regulator, still_ticks, settling_ticks, arrived_ticks)
+
+
+def _drive_off(
+    motion: int, profile: Profile, reference: Reference, counts: tuple[int, ...], regulator: PidState
+) -> FirmwareState:
+    return FirmwareState(motion, profile, reference, counts, regulator, 0, 0, 0)
+
+
+def position_error(reference: Reference, count: int) -> int:
+    """Return how far the encoder is from the reference position, in whole counts."""
+    return wrap_int32(reference.position_count + (reference.fraction >> (POSITION_BITS - 1)) - count)

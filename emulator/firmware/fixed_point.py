@@ -1,0 +1,66 @@
+"""The firmware's number formats: integers with a stated number of fraction bits.
+
+Each quantity fits a 32-bit register; a product of two, and a distance with its fraction, fit 64 bits. Shifts to the
+right round towards minus infinity, as an arithmetic shift does on the controller.
+
+| quantity | unit | fraction bits | register |
+|---|---|---|---|
+| position | encoder count | 0, and a second word of 26 | 32 + 26 |
+| distance | encoder count | 0, and a second word of 26 | 38 + 26: braking may lead far away from the target |
+| speed | count/tick | 26 | 32, so less than 32 counts a tick |
+| acceleration | count/tick^2 | 26 | 32 |
+| speed error | count/window | 8 | 32 |
+| proportional and derivative gain | PWM step/(count/window) | 12 | 32 |
+| integral gain | PWM step/(count/window) a tick | 16 | 32 |
+| integral, controller output | PWM step | 20 | 32 |
+"""
+
+from fractions import Fraction
+
+from emulator.int32 import INT32_MAX
+
+POSITION_BITS = 26
+SPEED_BITS = 26
+ERROR_BITS = 8
+GAIN_BITS = 12
+INTEGRAL_GAIN_BITS = 16
+OUTPUT_BITS = ERROR_BITS + GAIN_BITS
+
+POSITION_MASK = (1 << POSITION_BITS) - 1
+
+
+def clamp(number: int, bound: int) -> int:
+    """Return `number`, or what is nearest to it within -bound..bound."""
+    if number > bound:
+        return bound
+    if number < -bound:
+        return -bound
+    return number
+
+
+def to_fixed(value: Fraction | float, fraction_bits: int) -> int:
+    """Return the integer nearest to `value` with that many fraction bits; halves go to the even one."""
+    return round(Fraction(value) * (1 << fraction_bits))
+
+
+def gain_registers(proportional: float, integral: float, derivative: float) -> tuple[int, int, int]:
+    """Return a gain set, in the units of the table above, as the firmware's registers hold it.
+
+    Raises:
+        OverflowError: A gain does not fit its register, or the integral gain rounds to nothing.
+    """
+    registers = (
+        to_fixed(proportional, GAIN_BITS),
+        to_fixed(integral, INTEGRAL_GAIN_BITS),
+        to_fixed(derivative, GAIN_BITS),
+    )
+    if max(registers) > INT32_MAX or registers[1] < 1:
+        raise OverflowError(
+            f"its registers would hold {registers}; each must be at most {INT32_MAX}, the integral gain at least 1"
+        )
+    return registers
+
+
+def from_fixed(number: int, fraction_bits: int) -> float:
+    """Return the value of an integer with that many fraction bits."""
+    return number / (1 << fraction_bits)

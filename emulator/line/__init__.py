@@ -1,0 +1,1 @@
+"""The serial line: frames of bits, and the bytes on their way."""

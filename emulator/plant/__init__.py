@@ -1,0 +1,1 @@
+"""The plant: motor, friction, gears with backlash, and the encoder on the motor's shaft."""

@@ -1,0 +1,256 @@
+"""Motor, gears with backlash, and table: the plant between the PWM voltage and the true angle of the table.
+
+The teeth of the chain are either in contact, on the flank that drives the table forwards (`contact` = 1) or backwards
+(-1), and motor and table turn as one; or the motor runs free within the backlash (0), and the table coasts. A tick is
+taken in one of these states. Contact ends when the table would have to pull on the flank; when the gap closes, the two
+speeds meet without rebound.
+
+The gears' efficiency acts on the torque through the teeth: a table that is driven weighs 1/efficiency of its torque on
+the motor, one that drives the motor only its efficiency.
+"""
+
+import math
+from typing import NamedTuple
+
+from emulator.plant.friction import Friction, sliding_torque_Nm
+from emulator.plant.motor import Motor, MotorStep, discretise
+
+
+class Gears(NamedTuple):
+    """The gear chain between motor and table."""
+
+    ratio: float
+    efficiency: float
+    inertia_kg_m2: float  # at the motor
+    backlash_arcmin: float  # at the table
+
+
+class Coupling(NamedTuple):
+    """Motor and table in contact, for one direction of the power through the teeth."""
+
+    motor: MotorStep
+    torque_ratio: float  # torque at the motor for a torque at the table
+    inertia_kg_m2: float  # of the table, at the motor
+
+
+class DriveTrain(NamedTuple):
+    """The constants of the plant, per tick."""
+
+    free: MotorStep
+    driving: Coupling
+    overhauling: Coupling
+    friction: Friction
+    torque_constant_Nm_A: float
+    resistance_ohm: float
+    current_decay: float  # of a motor that stands, per tick
+    motor_inertia_kg_m2: float  # with the gears
+    table_inertia_kg_m2: float
+    bearing_friction_Nm: float
+    ratio: float
+    table_per_motor: float  # the reciprocal of the ratio
+    half_gap_rad: float  # at the table
+    tick_s: float
+    inertial_torque_Nm_s: float  # at the table, for each rad/s by which the motor's speed changes within a tick
+
+    @classmethod
+    def of(
+        cls,
+        motor: Motor,
+        gears: Gears,
+        friction: Friction,
+        *,
+        table_inertia_kg_m2: float,
+        bearing_friction_Nm: float,
+        tick_s: float,
+    ) -> "DriveTrain":
+        """Return the plant of these parts; `friction` is that of motor and gears at the motor's shaft."""
+        motor_inertia = motor.rotor_inertia_kg_m2 + gears.inertia_kg_m2
+
+        def coupling(torque_ratio: float) -> Coupling:
+            inertia = table_inertia_kg_m2 * torque_ratio / gears.ratio
+            return Coupling(discretise(motor, motor_inertia + inertia, tick_s), torque_ratio, inertia)
+
+        return cls(
+            free=discretise(motor, motor_inertia, tick_s),
+            driving=coupling(1.0 / (gears.ratio * gears.efficiency)),
+            overhauling=coupling(gears.efficiency / gears.ratio),
+            friction=friction,
+            torque_constant_Nm_A=motor.torque_constant_Nm_A,
+            resistance_ohm=motor.resistance_ohm,
+            current_decay=math.exp(-motor.resistance_ohm / motor.inductance_H * tick_s),
+            motor_inertia_kg_m2=motor_inertia,
+            table_inertia_kg_m2=table_inertia_kg_m2,
+            bearing_friction_Nm=bearing_friction_Nm,
+            ratio=gears.ratio,
+            table_per_motor=1.0 / gears.ratio,
+            half_gap_rad=math.radians(gears.backlash_arcmin / 60.0) / 2.0,
+            tick_s=tick_s,
+            inertial_torque_Nm_s=table_inertia_kg_m2 / (gears.ratio * tick_s),
+        )
+
+
+class DriveState(NamedTuple):
+    """Where the plant is. Angles are unwrapped."""
+
+    current_A: float
+    speed_rad_s: float  # of the motor
+    angle_rad: float  # of the motor
+    table_speed_rad_s: float
+    table_angle_rad: float
+    contact: int  # 1 or -1: on the flank that drives forwards or backwards; 0: within the gap
+
+
+def at_standstill(train: DriveTrain, gap_share: float) -> DriveState:
+    """Return a plant at rest whose teeth stand at `gap_share` (-1..1) of the way from mid-gap to a flank."""
+    contact = 1 if train.half_gap_rad == 0.0 else 0
+    return DriveState(0.0, 0.0, 0.0, 0.0, -gap_share * train.half_gap_rad, contact)
+
+
+def step(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
+    """Return the plant one tick later; the load torque at the table resists positive rotation."""
+    if state.contact == 0:
+        return _free(train, state, voltage_V, load_torque_Nm)
+    if state.speed_rad_s == 0.0:
+        return _standing(train, state, voltage_V, load_torque_Nm)
+    return _turning(train, state, voltage_V, load_torque_Nm)
+
+
+def _turning(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
+    """In contact and moving. Friction keeps the value that it has at the start of the tick."""
+    speed, contact = state.speed_rad_s, state.contact
+    direction = 1 if speed > 0.0 else -1
+    rigid = train.half_gap_rad == 0.0
+    table_torque = direction * train.bearing_friction_Nm + load_torque_Nm
+    friction = direction * sliding_torque_Nm(train.friction, speed)
+    coupling = train.driving if rigid or direction == contact else train.overhauling
+    current, next_speed, angle = _motor(
+        coupling.motor, state, voltage_V, friction + coupling.torque_ratio * table_torque
+    )
+    tooth_torque = train.inertial_torque_Nm_s * (next_speed - speed) + table_torque
+    if rigid and direction * tooth_torque < 0.0:
+        coupling = train.overhauling
+        current, next_speed, angle = _motor(
+            coupling.motor, state, voltage_V, friction + coupling.torque_ratio * table_torque
+        )
+    elif contact * tooth_torque < 0.0 and not rigid:
+        return _free(train, state, voltage_V, load_torque_Nm)
+    if next_speed * direction <= 0.0:
+        current = _standing_current(train, state.current_A, voltage_V)
+        next_speed, angle = 0.0, _stopping_angle(state.angle_rad, speed, next_speed, train.tick_s)
+    return _together(train, current, next_speed, angle, contact)
+
+
+def _standing(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
+    """In contact and at rest: static friction holds, or the motor breaks away, or one side leaves the flank."""
+    contact, rigid = state.contact, train.half_gap_rad == 0.0
+    current = _standing_current(train, state.current_A, voltage_V)
+    torque = train.torque_constant_Nm_A * current
+    pressed = contact * load_torque_Nm > train.bearing_friction_Nm
+    pulled = contact * load_torque_Nm < -train.bearing_friction_Nm
+    if not rigid and (pulled or (contact * torque < 0.0 and not pressed)):
+        return _free(train, state, voltage_V, load_torque_Nm)
+    for direction in (1, -1):
+        table_torque = direction * train.bearing_friction_Nm + load_torque_Nm
+        coupling = train.driving if direction * table_torque >= 0.0 else train.overhauling
+        resisting = direction * train.friction.static_Nm + coupling.torque_ratio * table_torque
+        if direction * (torque - resisting) > 0.0:
+            next_current, next_speed, angle = _motor(coupling.motor, state, voltage_V, resisting)
+            if direction * next_speed > 0.0:
+                return _together(train, next_current, next_speed, angle, contact)
+    return DriveState(current, 0.0, state.angle_rad, 0.0, state.table_angle_rad, contact)
+
+
+def _free(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
+    """Within the gap: the motor runs alone, the table coasts, until they meet."""
+    current, speed, angle = _lone_motor(train, state, voltage_V)
+    table_speed, table_angle = _coasting_table(train, state, load_torque_Nm)
+    gap = angle * train.table_per_motor - table_angle
+    if abs(gap) < train.half_gap_rad:
+        return DriveState(current, speed, angle, table_speed, table_angle, 0)
+    contact = 1 if gap > 0.0 else -1
+    gap_before = state.angle_rad * train.table_per_motor - state.table_angle_rad
+    closing = gap - gap_before
+    share = (contact * train.half_gap_rad - gap_before) / closing if contact * closing > 0.0 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    common_speed = _speed_after_impact(train, contact, speed, table_speed * train.ratio)
+    angle = state.angle_rad + share * (angle - state.angle_rad) + (1.0 - share) * train.tick_s * common_speed
+    return _together(train, current, common_speed, angle, contact)
+
+
+def _speed_after_impact(train: DriveTrain, contact: int, speed: float, table_speed: float) -> float:
+    """Return the common speed of motor and table, at the motor, after they have met on a flank.
+
+    The impulse through the teeth pays for the gears' losses on the side that it drives: on the table's while the motor
+    still turns towards the flank, from then on, if the table throws it back, on the motor's.
+    """
+    motor, driven, driving = train.motor_inertia_kg_m2, train.driving.inertia_kg_m2, train.overhauling.inertia_kg_m2
+    if contact * speed > 0.0:
+        momentum = motor * speed + driven * table_speed
+        if contact * momentum >= 0.0:
+            return momentum / (motor + driven)
+        speed, table_speed = 0.0, momentum / driven
+    return (motor * speed + driving * table_speed) / (motor + driving)
+
+
+def _lone_motor(train: DriveTrain, state: DriveState, voltage_V: float) -> tuple[float, float, float]:
+    """Return current, speed and angle of a motor without the table one tick later."""
+    speed = state.speed_rad_s
+    direction = 1 if speed > 0.0 else -1
+    resisting = direction * sliding_torque_Nm(train.friction, speed)
+    if speed == 0.0:
+        current = _standing_current(train, state.current_A, voltage_V)
+        torque = train.torque_constant_Nm_A * current
+        if abs(torque) <= train.friction.static_Nm:
+            return current, 0.0, state.angle_rad
+        direction = 1 if torque > 0.0 else -1
+        resisting = direction * train.friction.static_Nm
+    current, next_speed, angle = _motor(train.free, state, voltage_V, resisting)
+    if next_speed * direction <= 0.0:
+        current = _standing_current(train, state.current_A, voltage_V)
+        return current, 0.0, _stopping_angle(state.angle_rad, speed, next_speed, train.tick_s)
+    return current, next_speed, angle
+
+
+def _coasting_table(train: DriveTrain, state: DriveState, load_torque_Nm: float) -> tuple[float, float]:
+    """Return speed and angle of a table without the motor one tick later."""
+    speed, angle = state.table_speed_rad_s, state.table_angle_rad
+    if speed == 0.0:
+        if abs(load_torque_Nm) <= train.bearing_friction_Nm:
+            return speed, angle
+        direction = -1 if load_torque_Nm > 0.0 else 1
+    else:
+        direction = 1 if speed > 0.0 else -1
+    deceleration = (direction * train.bearing_friction_Nm + load_torque_Nm) / train.table_inertia_kg_m2
+    next_speed = speed - deceleration * train.tick_s
+    if next_speed * direction <= 0.0:
+        return 0.0, _stopping_angle(angle, speed, next_speed, train.tick_s)
+    return next_speed, angle + 0.5 * (speed + next_speed) * train.tick_s
+
+
+def _motor(motor: MotorStep, state: DriveState, voltage_V: float, torque_Nm: float) -> tuple[float, float, float]:
+    """Return current, speed and angle of the motor one tick later, against a torque that resists it."""
+    ii, iw, iv, im, wi, ww, wv, wm, ai, aw, av, am = motor  # the letters of `motor`: row, then column
+    current, speed = state.current_A, state.speed_rad_s
+    return (
+        ii * current + iw * speed + iv * voltage_V + im * torque_Nm,
+        wi * current + ww * speed + wv * voltage_V + wm * torque_Nm,
+        state.angle_rad + ai * current + aw * speed + av * voltage_V + am * torque_Nm,
+    )
+
+
+def _standing_current(train: DriveTrain, current_A: float, voltage_V: float) -> float:
+    """Return the current of a motor that stands one tick later: without back-EMF only the inductance is in its way."""
+    final = voltage_V / train.resistance_ohm
+    return final + (current_A - final) * train.current_decay
+
+
+def _stopping_angle(angle_rad: float, speed_rad_s: float, next_speed_rad_s: float, tick_s: float) -> float:
+    """Return where a body stops that would have changed its direction within the tick."""
+    change = speed_rad_s - next_speed_rad_s
+    return angle_rad if change == 0.0 else angle_rad + 0.5 * speed_rad_s * tick_s * speed_rad_s / change
+
+
+def _together(train: DriveTrain, current_A: float, speed_rad_s: float, angle_rad: float, contact: int) -> DriveState:
+    """Return the plant whose table turns with the motor, pressed to a flank."""
+    table_angle = angle_rad * train.table_per_motor - contact * train.half_gap_rad
+    return DriveState(current_A, speed_rad_s, angle_rad, speed_rad_s * train.table_per_motor, table_angle, contact)

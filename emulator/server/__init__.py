@@ -1,0 +1,1 @@
+"""The running emulator: clock, signals, control channel, trace."""

@@ -1,0 +1,175 @@
+"""The control channel: what a person or a test may do to the stand-in besides talking to it on the wire.
+
+A request is one line of JSON, `{"command": NAME, PARAMETER: NUMBER, ...}`; its answer is one line, `{"ok": true, ...}`
+or `{"ok": false, "error": SENTENCE}`. `control` carries them.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Protocol
+
+from emulator.faults.fault import KINDS, Fault, FaultError, fault_from, parameters_of
+from emulator.faults.parameter import Parameter, brief
+from emulator.server.clock import TIME_SCALE
+from emulator.table.status import TableStatus
+
+
+class Stand(Protocol):
+    """What commands act on: the running stand-in."""
+
+    @property
+    def time_scale(self) -> float:
+        """Simulated seconds in a real second."""
+        ...
+
+    def trigger(self) -> None:
+        """Latch the encoder at this instant."""
+        ...
+
+    def status(self) -> TableStatus:
+        """Return the table as it is at this instant."""
+        ...
+
+    def set_load_torque(self, torque_Nm: float) -> None:
+        """Load the table from now on."""
+        ...
+
+    def set_time_scale(self, time_scale: float) -> None:
+        """Run at another rate from now on."""
+        ...
+
+    def reset(self) -> None:
+        """Cut the table's power and switch it on again."""
+        ...
+
+    def preset(self, count: int) -> None:
+        """Cut the table's power and switch it on again, with its counter at `count`."""
+        ...
+
+    def inject(self, fault: Fault) -> None:
+        """Let something go wrong, now or when the fault says."""
+        ...
+
+    def clear_faults(self) -> None:
+        """End all faults."""
+        ...
+
+    def quit(self) -> None:
+        """End when the present events are served."""
+        ...
+
+
+class Command(NamedTuple):
+    """One verb of the control channel; `run` returns what its answer says beyond `ok`."""
+
+    help: str
+    parameters: tuple[Parameter, ...]
+    run: Callable[[Stand, Mapping[str, float]], Mapping[str, Any] | None]
+
+
+def _fault_command(kind: str) -> Command:
+    """Return the command that injects a fault of this kind."""
+    return Command(
+        f"fault: {KINDS[kind].help}",
+        parameters_of(kind),
+        lambda stand, given: stand.inject(fault_from(kind, given)),
+    )
+
+
+COMMANDS: Mapping[str, Command] = {
+    "trigger": Command("latch the encoder, as the probe's signal does", (), lambda stand, _: stand.trigger()),
+    "state": Command(
+        "show the table from inside: positions, speeds, motor, queues",
+        (),
+        lambda stand, _: {**stand.status()._asdict(), "time_scale": stand.time_scale},
+    ),
+    "load-torque": Command(
+        "load the table with a constant torque",
+        (
+            Parameter(
+                "torque_Nm", -1000.0, 1000.0, "torque at the table's axis in Nm; positive resists forward rotation"
+            ),
+        ),
+        lambda stand, given: stand.set_load_torque(given["torque_Nm"]),
+    ),
+    "time-scale": Command(
+        "run faster or slower than real time",
+        (TIME_SCALE,),
+        lambda stand, given: stand.set_time_scale(given["time_scale"]),
+    ),
+    "reset": Command("cut the table's power and switch it on again", (), lambda stand, _: stand.reset()),
+    "preset": Command(
+        "reset the table, and let its counter begin elsewhere than at 0",
+        (Parameter("count", -(2**31), 2**31 - 1, "where the counter begins", whole=True),),
+        lambda stand, given: stand.preset(int(given["count"])),
+    ),
+    "clear-faults": Command("end all faults, and forget those to come", (), lambda stand, _: stand.clear_faults()),
+    "quit": Command("end the stand-in as SIGTERM does", (), lambda stand, _: stand.quit()),
+} | {f"fault-{kind}": _fault_command(kind) for kind in KINDS}
+"""Every verb, in one place: the server runs them, the command-line client shows them."""
+
+
+class RequestError(ValueError):
+    """A request that cannot be carried out; the message is the answer's sentence."""
+
+
+def answer(request: bytes, stand: Stand) -> bytes:
+    """Carry out one request and return its answer; a bad request changes nothing."""
+    try:
+        command, given = _parse(request)
+        result = command.run(stand, given) or {}
+    except (RequestError, FaultError) as error:
+        return refusal(str(error))
+    return json.dumps({"ok": True, **result}).encode() + b"\n"
+
+
+def _parse(request: bytes) -> tuple[Command, dict[str, float]]:
+    fields = parsed_line(request)
+    if not isinstance(fields, dict) or not isinstance(name := fields.pop("command", None), str):
+        raise RequestError('a request is a JSON object that names its command, such as {"command": "state"}')
+    if name not in COMMANDS:
+        raise RequestError(f"{brief(name)} is not a command; there are {', '.join(COMMANDS)}")
+    command = COMMANDS[name]
+    required = {parameter.name for parameter in command.parameters if not parameter.optional}
+    if not required <= fields.keys() <= {parameter.name for parameter in command.parameters}:
+        expected = [
+            f"{parameter.name} (optional)" if parameter.optional else parameter.name for parameter in command.parameters
+        ]
+        raise RequestError(f"{name} takes {' and '.join(expected) or 'no parameter'}, and nothing else")
+    return command, {
+        parameter.name: _number(name, parameter, fields[parameter.name])
+        for parameter in command.parameters
+        if parameter.name in fields
+    }
+
+
+def parsed_line(line: bytes) -> Any:  # noqa: ANN401  # whatever JSON holds
+    """Return the value of a line of JSON.
+
+    Raises:
+        RequestError: it is not JSON, nested too deep, or a name occurs twice in an object.
+    """
+    try:
+        return json.loads(line, object_pairs_hook=_object)
+    except RequestError:
+        raise
+    except (ValueError, RecursionError):
+        raise RequestError('a request is one line of JSON, such as {"command": "state"}') from None
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    fields = dict(pairs)
+    if len(fields) < len(pairs):
+        raise RequestError("a request names each parameter once")
+    return fields
+
+
+def _number(command: str, parameter: Parameter, value: Any) -> float:  # noqa: ANN401  # from outside
+    if parameter.accepts(value):
+        return float(value)
+    raise RequestError(f"{command}: {parameter.name} must be {parameter.allowed}, not {brief(value)}")
+
+
+def refusal(sentence: str) -> bytes:
+    """Return the answer to a request that is not carried out."""
+    return json.dumps({"ok": False, "error": sentence}).encode() + b"\n"

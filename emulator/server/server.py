@@ -1,0 +1,235 @@
+"""The running stand-in: one loop that keeps the table level with the clock and carries bytes between it and its ports.
+
+The table is advanced lazily: when a client or a signal calls, when a byte on the line is due, and every now and then
+so that there is never much to catch up with.
+"""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from itertools import chain
+from typing import TYPE_CHECKING
+
+from emulator.faults.fault import Fault
+from emulator.ports.port import Arrival, Port, spoiled
+from emulator.ports.readiness import wait_for
+from emulator.server.clock import Clock
+from emulator.server.signals import SignalWatch
+from emulator.table.status import TableStatus
+from emulator.table.table import Table
+
+if TYPE_CHECKING:
+    from emulator.server.control_socket import ControlSocket
+
+_LONGEST_SLEEP_S = 0.02
+_CATCH_UP_TICKS = 500
+_CATCH_UP_S = 0.05
+"""Longest stretch of catching up before clients are heard again."""
+_GIVE_UP_S = 0.5
+"""How far simulated time may be behind the clock before the clock is held back."""
+_LINE_BUFFER_BYTES = 256
+"""What waits for a slow line, in the driver of a real one; a client that sends more is made to wait."""
+_MOST_ARRIVALS = 64
+"""Looks at clients whose bytes wait until the line has carried those of one that has left."""
+_LAST_FRACTION = 1.0 - 2.0**-20
+"""The latest that an edge can be in a tick."""
+_TRIGGER_SIGNAL = "SIGUSR1"
+_END_SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+SERVED_SIGNALS = (*_END_SIGNALS, _TRIGGER_SIGNAL)
+"""What a `SignalWatch` for the server collects."""
+
+
+class Server:
+    """Serves a table in real time, on any number of ports that are all the same wire.
+
+    Args:
+        table: the table; nobody else touches it while the server runs.
+        clock: counts the ticks that are due; at 0 when the table was switched on.
+        ports: where clients come in. Replies go to all of them.
+        signals: entered before the ports' names are published.
+        control: the control channel, if there is one.
+        warn: takes one sentence for the person who runs the stand-in.
+    """
+
+    def __init__(
+        self,
+        table: Table,
+        clock: Clock,
+        ports: Sequence[Port],
+        signals: SignalWatch,
+        control: "ControlSocket | None",
+        warn: Callable[[str], None],
+    ) -> None:
+        self._table = table
+        self._clock = clock
+        self._ports = ports
+        self._signals = signals
+        self._control = control
+        self._warn = warn
+        self._running = True
+        self._said_slow = False
+        self._said_two = False
+        self._arrivals: deque[Arrival] = deque()
+        self._leaving = False
+        self._hung_up = False
+
+    def run(self) -> None:
+        """Serve until a signal or the control channel ends it."""
+        while self._running:
+            readable, writable = self._wait()
+            self._catch_up()
+            self._let_go()
+            if self._table.hung_up is not self._hung_up:
+                self._follow_hang_up()
+            for port in self._ports:
+                if not writable.isdisjoint(port.output_descriptors):
+                    port.flush()
+                if not readable.isdisjoint(port.input_descriptors):
+                    self._arrivals.append(port.receive())
+                    self._warn_of_two()
+            self._serve_arrivals()
+            if self._control and not readable.isdisjoint(self._control.input_descriptors):
+                self._control.serve(self)
+            if self._signals.descriptor in readable:
+                self._serve_signals()
+
+    @property
+    def time_scale(self) -> float:
+        """Simulated seconds in a real second."""
+        return self._clock.time_scale
+
+    def trigger(self) -> None:
+        """Latch the encoder at this instant."""
+        fraction = self._clock.now_ticks() - self._table.tick
+        if fraction <= 0.0:  # another edge in the tick that the one before it has brought to its end
+            self._table.trigger()
+            return
+        self._table.trigger(min(fraction, _LAST_FRACTION))
+        # The tick that the edge is in must be over before a client can ask for the latch.
+        self._table.advance(1)
+        self._send_replies()
+
+    def status(self) -> TableStatus:
+        """Return the table as it is at this instant."""
+        return self._table.status()
+
+    def set_load_torque(self, torque_Nm: float) -> None:
+        """Load the table from now on."""
+        self._table.set_load_torque(torque_Nm)
+
+    def set_time_scale(self, time_scale: float) -> None:
+        """Run at another rate from now on."""
+        self._clock.set_time_scale(time_scale)
+        self._said_slow = False
+
+    def reset(self) -> None:
+        """Cut the table's power and switch it on again."""
+        self._table.reset()
+
+    def preset(self, count: int) -> None:
+        """Cut the table's power and switch it on again, with its counter at `count`."""
+        self._table.reset(count)
+
+    def inject(self, fault: Fault) -> None:
+        """Let something go wrong, now or when the fault says."""
+        self._table.inject(fault)
+
+    def clear_faults(self) -> None:
+        """End all faults."""
+        self._table.clear_faults()
+
+    def quit(self) -> None:
+        """End `run` when the present events are served."""
+        self._running = False
+
+    def _wait(self) -> tuple[set[int], set[int]]:
+        """Return the descriptors that can be read and written, once there are any or the table is due."""
+        inputs = [self._signals.descriptor]
+        if self._control:
+            inputs += self._control.input_descriptors
+        if not self._line_is_full():
+            inputs += chain.from_iterable(port.input_descriptors for port in self._ports)
+        outputs = list(chain.from_iterable(port.output_descriptors for port in self._ports))
+        return wait_for(inputs, outputs, self._sleep_s())
+
+    def _line_is_full(self) -> bool:
+        """Return whether clients must wait, as behind any slow line."""
+        if self._table.ticks_until_byte() is None:
+            return False
+        waiting = self._table.status().received_queue + sum(len(arrival.data) for arrival in self._arrivals)
+        return waiting >= _LINE_BUFFER_BYTES or len(self._arrivals) >= _MOST_ARRIVALS
+
+    def _sleep_s(self) -> float:
+        ticks = self._table.ticks_until_byte()
+        if ticks is None:
+            return _LONGEST_SLEEP_S
+        return min(_LONGEST_SLEEP_S, self._clock.wall_s_until(self._table.tick + ticks))
+
+    def _catch_up(self) -> None:
+        """Bring the table level with the clock, or the clock with the table when that is too far ahead."""
+        end_s = self._clock.wall_s() + _CATCH_UP_S
+        while (behind := int(self._clock.now_ticks()) - self._table.tick) > 0:
+            if behind > _GIVE_UP_S * self._clock.ticks_per_wall_s:
+                self._hold_the_clock_back(behind)
+                return
+            if self._clock.wall_s() > end_s:
+                return
+            self._table.advance(min(behind, _CATCH_UP_TICKS))
+            self._send_replies()
+
+    def _hold_the_clock_back(self, behind: int) -> None:
+        """Leave out the time for which the process was stopped, or the machine too slow."""
+        self._clock.set_ticks(self._table.tick)
+        if not self._said_slow:
+            self._warn(
+                f"simulated time falls behind, by {behind / self._clock.ticks_per_wall_s:.1f} s of the clock, which "
+                "are left out: the process was stopped, or this machine is busy, or too slow for time scale "
+                f"{self.time_scale:g}"
+            )
+            self._said_slow = True
+
+    def _follow_hang_up(self) -> None:
+        """Take the ports away, or bring them back, as a fault of the table says."""
+        self._hung_up = self._table.hung_up
+        for port in self._ports:
+            if self._hung_up:
+                port.hang_up()
+            else:
+                port.come_back()
+
+    def _serve_arrivals(self) -> None:
+        """Give the table what clients have sent; what came after one that has left waits for the end of that."""
+        while self._arrivals and not self._leaving:
+            arrival = self._arrivals.popleft()
+            if arrival.left_before:
+                self._table.disconnect()
+            if arrival.data:
+                self._table.receive(spoiled(arrival.data, arrival.doubtful_lines))
+                self._send_replies()
+            if arrival.left_after:
+                self._leaving = True
+                self._let_go()
+
+    def _warn_of_two(self) -> None:
+        busy = [port.name for port in self._ports if port.client_count]
+        if len(busy) > 1 and not self._said_two:
+            self._warn(f"{' and '.join(busy)} have clients at once: each hears the replies to both")
+        self._said_two = len(busy) > 1
+
+    def _let_go(self) -> None:
+        """Forget a client that has left, once the table has all that it sent: nothing of it may meet the next one."""
+        if self._leaving and self._table.ticks_until_byte() is None:
+            self._table.disconnect()
+            self._leaving = False
+
+    def _send_replies(self) -> None:
+        data = self._table.transmit()
+        if data and not self._leaving:
+            for port in self._ports:
+                port.send(data)
+
+    def _serve_signals(self) -> None:
+        for number in self._signals.received():
+            if number.name == _TRIGGER_SIGNAL:
+                self.trigger()
+            else:
+                self.quit()

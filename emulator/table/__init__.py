@@ -1,0 +1,1 @@
+"""The whole table: plant, firmware and line, tick by tick."""

@@ -1,0 +1,66 @@
+"""What faults do to the drive and to the encoder: the tick of a table that is not sound."""
+
+import math
+
+from emulator.faults.schedule import FaultSchedule
+from emulator.firmware.controller import step as firmware_step
+from emulator.int32 import wrap_int32
+from emulator.plant.drive_train import DriveState
+from emulator.plant.drive_train import step as drive_step
+from emulator.plant.encoder import count_at
+from emulator.plant.friction import Friction
+from emulator.table.tick import TableConstants, TableState
+
+_KINDS = frozenset(
+    ("stall", "extra-load", "supply-sag", "stuck-pwm", "one-sided", "lost-counts", "swapped-encoder", "dead-encoder")
+)
+_HELD_OVER_STALL = 4.0
+"""What holds a stalled table, over the motor's own stall torque."""
+
+
+def is_faulty(faults: FaultSchedule) -> bool:
+    """Return whether a tick of plant and controller is another than that of a sound table."""
+    return faults.holds_any(_KINDS)
+
+
+def faulty_step(
+    faults: FaultSchedule, constants: TableConstants, state: TableState, load_torque_Nm: float, supply_V: float
+) -> tuple[TableConstants, TableState]:
+    """Return the table one tick later, as `tick.step` does; what the encoder missed stays missed, in its phase."""
+    drive = _drive_step(faults, constants, state, load_torque_Nm, supply_V)
+    before = state.firmware.counts[-1]
+    turned = wrap_int32(count_at(constants.encoder, drive.angle_rad) - before)
+    counted = _counted(faults, turned)
+    if counted != turned:
+        phase = constants.encoder.phase + (counted - turned)
+        constants = constants._replace(encoder=constants.encoder._replace(phase=phase))
+    controller = firmware_step(constants.firmware, state.firmware, wrap_int32(before + counted))
+    return constants, TableState(drive, controller, state.firmware.pid.duty)
+
+
+def _drive_step(
+    faults: FaultSchedule, constants: TableConstants, state: TableState, load_torque_Nm: float, supply_V: float
+) -> DriveState:
+    duty, supply_share, train = state.duty, 1.0, constants.drive
+    if fault := faults.holding("stuck-pwm"):
+        duty = round(fault.value("duty") * constants.firmware.pid.duty_max)
+    if (fault := faults.holding("one-sided")) and duty * fault.value("direction") <= 0:
+        duty = 0
+    if fault := faults.holding("supply-sag"):
+        supply_share = fault.value("supply_V") / supply_V
+    if fault := faults.holding("extra-load"):
+        load_torque_Nm += fault.value("torque_Nm")
+    if faults.holding("stall"):
+        holding_Nm = _HELD_OVER_STALL * train.torque_constant_Nm_A * supply_V / train.resistance_ohm
+        train = train._replace(friction=Friction(holding_Nm, holding_Nm, train.friction.stribeck_s_rad))
+    return drive_step(train, state.drive, duty * supply_share * constants.volts_per_duty, load_torque_Nm)
+
+
+def _counted(faults: FaultSchedule, turned: int) -> int:
+    """Return how many counts the counter moves by when the shaft has turned by so many."""
+    if faults.holding("dead-encoder"):
+        return 0
+    if fault := faults.holding("lost-counts"):
+        seen = sum(not faults.strikes(fault.value("probability")) for _ in range(abs(turned)))
+        turned = int(math.copysign(seen, turned))
+    return -turned if faults.holding("swapped-encoder") else turned

@@ -1,0 +1,91 @@
+"""Long stretches of undisturbed ticks at machine speed, where numba is installed.
+
+A compiled tick takes a hundredth of an interpreted one, but numba has to be imported first (about half a second), and
+the code compiled (some seconds) where no earlier run has left it. Ticks are interpreted until they have cost about as
+much, so that no session takes more than twice the time of the better choice.
+"""
+
+import sys
+from collections.abc import Callable
+from importlib.util import find_spec
+from typing import Final
+
+from emulator.table.machine_code_folder import has_machine_code
+from emulator.table.tick import TableConstants, TableState, run_undisturbed
+from protocol.interrupts import signals_wait
+
+Run = Callable[[TableConstants, TableState, float, int], tuple[TableState, bool]]
+"""What passes undisturbed ticks; see `tick.run_undisturbed`."""
+
+SHORT_TICKS: Final = 6
+"""Fewer are interpreted: a compiled call takes as long as some interpreted ticks."""
+
+LOADED_TICKS: Final = 10_000
+"""Interpreted ticks that cost as much as the first compiled one, with numba imported and machine code kept."""
+
+KEPT_TICKS: Final = 150_000
+"""The same with machine code kept from an earlier run, and numba still to be imported."""
+
+NEW_TICKS: Final = 1_000_000
+"""The same without any machine code."""
+
+_PIECE_TICKS = 1000
+_LONGEST_CALL_TICKS = 10_000_000
+"""For so many ticks, a third of a second, Ctrl-C may wait."""
+
+
+class FastTicks:
+    """`tick.run_undisturbed`, to the last bit, interpreted at first and compiled once that pays.
+
+    Attributes:
+        warm_up_ticks: how many are interpreted at first; None until it is known how many are best here.
+    """
+
+    def __init__(self, warm_up_ticks: int | None = None) -> None:
+        self.warm_up_ticks = warm_up_ticks
+        self._interpreted_ticks = 0
+        self._compiled: Run | None = None
+        self._is_hopeless = find_spec("numba") is None
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether long stretches run compiled from now on."""
+        return self._compiled is not None
+
+    def __call__(
+        self, constants: TableConstants, state: TableState, load_torque_Nm: float, ticks: int
+    ) -> tuple[TableState, bool]:
+        """Return the table after ticks in which nothing comes from outside, and whether it rests."""
+        resting = False
+        while ticks > 0 and not resting:
+            if ticks < SHORT_TICKS or not self._pays():
+                some = min(ticks, _PIECE_TICKS)
+                state, resting = run_undisturbed(constants, state, load_torque_Nm, some)
+                self._interpreted_ticks += some
+            else:
+                assert self._compiled is not None
+                some = min(ticks, _LONGEST_CALL_TICKS)
+                with signals_wait():
+                    state, resting = self._compiled(constants, state, load_torque_Nm, some)
+            ticks -= some
+        return state, resting
+
+    def _pays(self) -> bool:
+        """Return whether there is, or should now be, compiled code."""
+        if self._compiled is not None:
+            return True
+        if self._is_hopeless or (self._interpreted_ticks < LOADED_TICKS and self.warm_up_ticks is None):
+            return False
+        if self.warm_up_ticks is None:
+            self.warm_up_ticks = NEW_TICKS
+            if has_machine_code():
+                self.warm_up_ticks = LOADED_TICKS if "numba" in sys.modules else KEPT_TICKS
+        if self._interpreted_ticks < self.warm_up_ticks:
+            return False
+        try:
+            from emulator.table.machine_code import compiled  # noqa: PLC0415  # numba is imported only when that pays
+
+            self._compiled = compiled(run_undisturbed)
+        except (ImportError, OSError, RuntimeError):  # numba is broken, or has no folder that it can write
+            self._is_hopeless = True
+        return self._compiled is not None

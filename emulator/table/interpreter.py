@@ -1,0 +1,97 @@
+"""The command interpreter: what each of the six verbs does to the controller, and what it answers."""
+
+from decimal import Decimal
+from fractions import Fraction
+from typing import NamedTuple
+
+from emulator.config.table_config import TableConfig
+from emulator.firmware.controller import FirmwareState, begin_motion, distance_to
+from emulator.firmware.fixed_point import POSITION_BITS, SPEED_BITS, to_fixed
+from emulator.firmware.profiler import Profile
+from emulator.int32 import INT32_MAX
+from protocol.messages import Angle, Command, ErrorCode, Ok, Refusal, Reply, Verb
+
+_LAST_POSITION = INT32_MAX << POSITION_BITS
+_HALF_RANGE = (INT32_MAX + 1) << POSITION_BITS
+"""The longest motion; and, below 0, the first position."""
+
+
+class Registers(NamedTuple):
+    """What waits for the next motion command, and the latch."""
+
+    speed: int  # count/tick, 26 fraction bits
+    acceleration: int  # count/tick^2, 26 fraction bits
+    latched_count: int
+
+
+class Interpreter:
+    """Carries out commands on a controller's state; it has no state of its own."""
+
+    def __init__(self, config: TableConfig) -> None:
+        """Take the units and limits of a configured table."""
+        self._limits = config.limits
+        self._power_on = config.power_on
+        self._count_deg = Fraction(config.counts_per_turn) / 360
+        self._tick_hz = config.control.tick_hz
+
+    def power_on(self) -> Registers:
+        """Return the registers as the controller wakes; the latch holds the position at power-on."""
+        speed = self._speed(Fraction(self._power_on.speed_deg_s))
+        return Registers(speed, self._acceleration(Fraction(self._power_on.acceleration_deg_s2)), 0)
+
+    def angle_deg(self, count: int) -> Decimal:
+        """Return the angle of a count, to ten decimals."""
+        angle = count / self._count_deg
+        return (Decimal(angle.numerator) / angle.denominator).quantize(Decimal("1e-10"))
+
+    def execute(
+        self, command: Command, controller: FirmwareState, registers: Registers
+    ) -> tuple[Reply, FirmwareState, Registers]:
+        """Return the reply, and controller and registers after the command; a refused one changes nothing."""
+        verb = command.verb
+        if verb is Verb.READ_POSITION:
+            return Angle(verb, self.angle_deg(controller.counts[-1])), controller, registers
+        if verb is Verb.READ_LATCH:
+            return Angle(verb, self.angle_deg(registers.latched_count)), controller, registers
+        assert command.value is not None  # the codec gives the other verbs their number
+        value = Fraction(command.value)
+        if verb is Verb.SET_SPEED:
+            return self._set_speed(value, controller, registers)
+        if verb is Verb.SET_ACCELERATION:
+            return self._set_acceleration(value, controller, registers)
+        return self._move(verb, value, controller, registers)
+
+    def _set_speed(
+        self, value: Fraction, controller: FirmwareState, registers: Registers
+    ) -> tuple[Reply, FirmwareState, Registers]:
+        speed = self._speed(value)
+        if speed < 1 or value > self._limits.speed_deg_s:
+            return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
+        return Ok(), controller, registers._replace(speed=speed)
+
+    def _set_acceleration(
+        self, value: Fraction, controller: FirmwareState, registers: Registers
+    ) -> tuple[Reply, FirmwareState, Registers]:
+        acceleration = self._acceleration(value)
+        if acceleration < 1 or value > self._limits.acceleration_deg_s2:
+            return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
+        return Ok(), controller, registers._replace(acceleration=acceleration)
+
+    def _move(
+        self, verb: Verb, value: Fraction, controller: FirmwareState, registers: Registers
+    ) -> tuple[Reply, FirmwareState, Registers]:
+        distance = target = to_fixed(value * self._count_deg, POSITION_BITS)
+        if verb is Verb.MOVE_TO:
+            distance = distance_to(controller.reference, target)
+            if not -_HALF_RANGE <= target <= _LAST_POSITION:
+                return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
+        if abs(distance) > _HALF_RANGE:
+            return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
+        profile = Profile.of(registers.speed, registers.acceleration)
+        return Ok(), begin_motion(controller, profile, distance), registers
+
+    def _speed(self, speed_deg_s: Fraction) -> int:
+        return to_fixed(speed_deg_s * self._count_deg / self._tick_hz, SPEED_BITS)
+
+    def _acceleration(self, acceleration_deg_s2: Fraction) -> int:
+        return to_fixed(acceleration_deg_s2 * self._count_deg / self._tick_hz**2, SPEED_BITS)

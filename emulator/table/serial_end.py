@@ -1,0 +1,157 @@
+"""The controller's end of the serial line: the client's bytes are cut into lines, and replies go back as bytes.
+
+With a baud rate each byte takes its time on the line, both ways. At 0 there is no line to wait for: a command is
+answered in the call that brings it.
+"""
+
+from collections.abc import Callable
+
+from emulator.config.table_config import TableConfig
+from emulator.faults.line_faults import TO_CLIENT, TO_TABLE, LineFaults
+from emulator.faults.schedule import FaultSchedule
+from emulator.line.uart import LOST, Uart
+from protocol.line_buffer import LineBuffer
+from protocol.messages import LINE_LIMIT, ErrorCode
+
+_LONGEST_REPLY = LINE_LIMIT + 1
+_LINE_END = 0x0D
+
+Answer = Callable[[bytes | ErrorCode], bytes]
+"""The firmware: carries out a line, as `LineBuffer` gives it, and returns the reply."""
+
+
+class SerialEnd:
+    """UART, line buffer and the faults of the line, between a client's bytes and the firmware's lines.
+
+    Attributes:
+        uart: the paced line; idle for ever without pacing.
+    """
+
+    def __init__(self, config: TableConfig, faults: FaultSchedule) -> None:
+        """Start with an idle line."""
+        self.uart = Uart(config.serial.baud, config.control.tick_hz)
+        self._paced = config.serial.baud > 0
+        self._lines = LineBuffer()
+        self._faults = LineFaults(config.serial.baud, config.control.tick_hz, faults)
+        self._sent = b""
+        self._heard = self._said = b""  # since it was last overheard
+
+    def receive(self, data: bytes, tick: int, answer: Answer) -> None:
+        """Take bytes that the client puts on the line now."""
+        data = self._faults.on_the_line(data, TO_TABLE)
+        if self._paced:
+            self.uart.receive(data)
+        else:
+            self._read(data, tick, answer)
+
+    def transmit(self) -> bytes:
+        """Return the bytes that have left by now, and forget them."""
+        sent, self._sent = self._sent, b""
+        return sent
+
+    def advance(self, tick: int, answer: Answer) -> None:
+        """Let a tick pass on the line; the firmware reads as long as it has room for a reply."""
+        uart = self.uart
+        uart.advance()
+        while uart.readable and uart.transmit_room >= _LONGEST_REPLY:
+            byte = uart.read()
+            if byte is LOST:
+                self._lines.spoil()
+            else:
+                self._read(bytes((byte,)), tick, answer)
+        if sent := uart.transmit():
+            self._send(sent)
+
+    @property
+    def needs_each_tick(self) -> bool:
+        """Whether something can happen on the line that is not the end of a line."""
+        uart = self.uart
+        if uart.idle:
+            return False
+        return self._faults.are_present or not uart.is_read_at_once or uart.transmit_room < _LONGEST_REPLY
+
+    def ticks_until_line(self) -> int | None:
+        """Return the ticks until the firmware has a whole line; None while none is on its way."""
+        return self.uart.ticks_until_received(_LINE_END)
+
+    def pass_ticks(self, ticks: int, tick: int, answer: Answer) -> None:
+        """Let ticks pass, the last one up to `tick`, as so many calls of `advance` do.
+
+        The line does not need each of them, and no whole line comes before the last one.
+        """
+        if self.uart.idle:
+            return
+        if self.ticks_until_line() == ticks:
+            self._pass_quietly(ticks - 1, tick, answer)
+            self.advance(tick, answer)
+        else:
+            self._pass_quietly(ticks, tick, answer)
+
+    def ticks_until_sent(self, wanted: int, tick: int) -> int | None:
+        """Return the ticks until `wanted` bytes may have left, or a line comes that may bring them; None if none does.
+
+        Every byte is stopped at where faults may change it.
+        """
+        if self.needs_each_tick or self.held_until is not None:
+            return self.ticks_until_byte(tick)
+        if len(self.uart.outgoing) >= wanted:
+            return self.uart.ticks_until_sent(wanted)
+        line = self.ticks_until_line()
+        return self.ticks_until_byte(tick) if line is None else line
+
+    def write(self, reply: bytes, tick: int) -> None:
+        """Give a reply to the line."""
+        self._put(self._faults.on_a_reply(reply, tick))
+
+    @property
+    def held_until(self) -> int | None:
+        """The tick at which replies that a fault holds back go on; None where there are none."""
+        return self._faults.held_until
+
+    def release(self, tick: int) -> None:
+        """Let replies go on that were held back until now."""
+        if held := self._faults.released(tick):
+            self._put(held)
+
+    def ticks_until_byte(self, tick: int) -> int | None:
+        """Return the ticks until the next byte in either direction is over; None while the line is idle."""
+        ticks, held_until = self.uart.ticks_until_byte(), self._faults.held_until
+        if held_until is None:
+            return ticks
+        held = max(1, held_until - tick)
+        return held if ticks is None else min(ticks, held)
+
+    def disconnect(self) -> None:
+        """Forget the client's half line and the replies that it has not got: it has gone."""
+        self.uart.disconnect()
+        self._faults.disconnect()
+        self._lines.discard()
+        self._sent = b""
+
+    def overheard(self) -> tuple[bytes, bytes]:
+        """Return what the firmware has read and what has left since the last call, and forget it."""
+        heard, said, self._heard, self._said = self._heard, self._said, b"", b""
+        return heard, said
+
+    def _pass_quietly(self, ticks: int, tick: int, answer: Answer) -> None:
+        if data := self.uart.advance_by(ticks):
+            self._read(data, tick, answer)
+        if sent := self.uart.transmit():
+            self._send(sent)
+
+    def _read(self, data: bytes, tick: int, answer: Answer) -> None:
+        self._heard += data
+        for line in self._lines.feed(data):
+            if reply := answer(line):
+                self.write(reply, tick)
+
+    def _put(self, reply: bytes) -> None:
+        if self._paced:
+            self.uart.write(reply)
+        else:
+            self._send(reply)
+
+    def _send(self, data: bytes) -> None:
+        data = self._faults.on_the_line(data, TO_CLIENT)
+        self._sent += data
+        self._said += data

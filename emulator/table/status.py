@@ -1,0 +1,74 @@
+"""What can be seen of a table from outside the wire."""
+
+import math
+from typing import NamedTuple
+
+from emulator.config.table_config import TableConfig
+from emulator.firmware.controller import STATE_NAMES
+from emulator.firmware.fixed_point import POSITION_BITS, SPEED_BITS, from_fixed
+from emulator.firmware.pid import RAMP
+from emulator.line.uart import Uart
+from emulator.plant.encoder import Encoder
+from emulator.table.tick import TableState
+
+
+class TableStatus(NamedTuple):
+    """One look at a table. Angles are unwrapped; the true one is the table's own, behind the backlash."""
+
+    tick: int
+    reference_deg: float
+    encoder_deg: float
+    true_deg: float
+    reference_speed_deg_s: float
+    speed_deg_s: float  # as the firmware measures it
+    true_speed_deg_s: float
+    current_A: float
+    duty: float  # -1..1
+    gain_set: str  # "ramp" or "hold"
+    state: str  # "idle", "moving", "settling" or "stalled"
+    latched_deg: float
+    received_queue: int  # bytes that the firmware has not read
+    transmit_queue: int  # bytes that have not left
+    lost_bytes: int
+    load_torque_Nm: float
+    shaft_deg: float  # what an encoder without steps would read on the motor's shaft
+    gap_deg: float  # by how much the shaft is ahead of the table: half the backlash at most, either way
+
+
+def table_status(
+    config: TableConfig,
+    state: TableState,
+    uart: Uart,
+    *,
+    encoder: Encoder,
+    tick: int,
+    latched_count: int,
+    load_torque_Nm: float,
+    true_zero_rad: float,
+) -> TableStatus:
+    """Return what plant, controller and line say; the true angle counts from `true_zero_rad`."""
+    drive, controller, _ = state
+    reference, regulator = controller.reference, controller.pid
+    count_deg = config.counts_per_turn / 360.0
+    speed_deg_s = config.control.tick_hz / count_deg  # of one count a tick
+    return TableStatus(
+        tick=tick,
+        reference_deg=(reference.position_count + from_fixed(reference.fraction, POSITION_BITS)) / count_deg,
+        encoder_deg=controller.counts[-1] / count_deg,
+        true_deg=math.degrees(drive.table_angle_rad - true_zero_rad),
+        reference_speed_deg_s=from_fixed(reference.speed, SPEED_BITS) * speed_deg_s,
+        speed_deg_s=regulator.measured / config.control.speed_window_ticks * speed_deg_s,
+        true_speed_deg_s=math.degrees(drive.table_speed_rad_s),
+        current_A=drive.current_A,
+        duty=regulator.duty / config.driver.duty_max,
+        gain_set="ramp" if regulator.gain_set == RAMP else "hold",
+        state=STATE_NAMES[controller.motion],
+        latched_deg=latched_count / count_deg,
+        received_queue=uart.waiting_count,
+        transmit_queue=uart.transmit_count,
+        lost_bytes=uart.lost_bytes,
+        load_torque_Nm=load_torque_Nm,
+        # A count stands for all angles from its edge to the next, so that its middle is what it means.
+        shaft_deg=(drive.angle_rad * encoder.count_rad + encoder.phase - 0.5) / count_deg,
+        gap_deg=math.degrees(drive.angle_rad / config.gears.ratio - drive.table_angle_rad),
+    )

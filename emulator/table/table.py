@@ -1,0 +1,321 @@
+"""The whole table in one object, without threads or clock: bytes in, bytes out, and ticks."""
+
+import copy
+import math
+import random
+from collections.abc import Callable
+from typing import NamedTuple
+
+from emulator.config.table_config import TableConfig
+from emulator.faults.fault import Fault
+from emulator.faults.schedule import FaultSchedule
+from emulator.firmware.profiler import Profile
+from emulator.int32 import wrap_int32
+from emulator.plant.drive_train import DriveState, at_standstill
+from emulator.plant.encoder import angle_within_tick, count_at, recounted
+from emulator.table.drive_faults import faulty_step, is_faulty
+from emulator.table.fast_ticks import Run
+from emulator.table.interpreter import Interpreter, Registers
+from emulator.table.serial_end import SerialEnd
+from emulator.table.status import TableStatus, table_status
+from emulator.table.tick import TableConstants, TableState, run_undisturbed, step, table_constants, woken
+from emulator.table.trigger import TriggerInput
+from protocol.codec import decode_command, encode_reply
+from protocol.messages import Command, ErrorCode, Refusal
+
+Observer = Callable[[TableStatus, bytes, bytes], None]
+"""Called after each tick with the status, and the bytes that the firmware has read and that have left."""
+
+
+class Snapshot(NamedTuple):
+    """Everything that a table's future depends on, apart from its configuration."""
+
+    tick: int
+    constants: TableConstants
+    state: TableState
+    registers: Registers
+    serial: SerialEnd
+    triggers: TriggerInput
+    faults: FaultSchedule
+    load_torque_Nm: float
+    true_zero_rad: float
+
+
+class Table:
+    """A rotary table: firmware and plant behind a serial line, in simulated time.
+
+    The same configuration, seed, bytes and ticks give the same bytes and the same states to the last bit. The seed
+    says where the shaft stands between two encoder edges, and the teeth in the backlash, at power-on.
+
+    Attributes:
+        config: the table's constants.
+        tick: ticks since it was switched on.
+        observer: who sees every tick, if anybody.
+    """
+
+    def __init__(self, config: TableConfig, seed: int = 0, run: Run | None = None) -> None:
+        """Switch the table on, at rest at 0 degrees.
+
+        Args:
+            config: the table's constants.
+            seed: places shaft and gear teeth.
+            run: passes undisturbed ticks, once the state is asked for. Without it they pass at once, interpreted.
+        """
+        chance = random.Random(seed)  # noqa: S311  # where a gear stands is no secret
+        tick_hz = config.control.tick_hz
+        self.config = config
+        self.tick = 0
+        self.observer: Observer | None = None
+        self._interpreter = Interpreter(config)
+        self._registers = self._interpreter.power_on()
+        self._constants = table_constants(config, encoder_phase=chance.random())
+        self._run = run
+        self._owed_ticks = 0  # by which plant and controller are behind
+        self._resting = False  # the state repeats itself, so ticks cost nothing
+        self._state = self._woken(at_standstill(self._constants.drive, gap_share=chance.uniform(-1.0, 1.0)))
+        self._true_zero_rad = 0.0
+        self._load_torque_Nm = 0.0
+        self._faults = FaultSchedule(config.faults, tick_hz, seed)
+        self._serial = SerialEnd(config, self._faults)
+        self._triggers = TriggerInput(tick_hz, self._faults)
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes that the client puts on the line now."""
+        self._serial.receive(data, self.tick, self._answer)
+        if self.observer is None:
+            self._serial.overheard()  # and forgotten: nobody watches
+
+    def transmit(self) -> bytes:
+        """Return the bytes that have left by now, and forget them."""
+        return self._serial.transmit()
+
+    def ticks_until_byte(self) -> int | None:
+        """Return the ticks until the next byte in either direction is over; None while the line is idle."""
+        return self._serial.ticks_until_byte(self.tick)
+
+    def disconnect(self) -> None:
+        """Let the client go: its half line and its unsent replies are forgotten, its motion goes on."""
+        self._serial.disconnect()
+
+    @property
+    def hung_up(self) -> bool:
+        """Whether a fault has taken the port away."""
+        return self._faults.hangs_up
+
+    def inject(self, fault: Fault) -> None:
+        """Let something go wrong, now or when the fault says."""
+        if self._faults.inject(fault, self.tick):
+            self.disconnect()
+        self._resting = False
+
+    def clear_faults(self) -> None:
+        """End all faults, and forget those to come; replies that are late are still to come."""
+        self._faults.clear()
+
+    @property
+    def trigger_hz(self) -> float:
+        """The rate of the periodic trigger; 0 turns it off."""
+        return self._triggers.rate_hz
+
+    @trigger_hz.setter
+    def trigger_hz(self, rate_hz: float) -> None:
+        self._triggers.start_train(rate_hz, self.tick)
+
+    def trigger(self, fraction: float = 0.0) -> None:
+        """Put an edge on the trigger input, at a fraction (0..1) of the coming tick; the latch follows it."""
+        if not 0.0 <= fraction < 1.0:
+            raise ValueError(f"an edge at {fraction} of a tick is outside 0..1")
+        if fraction == 0.0:
+            self._see_edge(self._state.drive.angle_rad)
+        else:
+            self._triggers.add_edge(self.tick, fraction)
+
+    def set_load_torque(self, torque_Nm: float) -> None:
+        """Load the table with a torque that resists positive rotation, until it is set anew."""
+        if not math.isfinite(torque_Nm):
+            raise ValueError(f"a load torque of {torque_Nm} Nm is not finite")
+        self._pay()
+        self._load_torque_Nm = float(torque_Nm)
+        self._resting = False
+
+    def reset(self, count: int = 0) -> None:
+        """Switch the table off and on: the controller wakes at `count` where the plant is; the plant goes on."""
+        drive, encoder = self._state.drive, self._constants.encoder
+        self._constants = self._constants._replace(encoder=recounted(encoder, drive.angle_rad, count))
+        self._true_zero_rad = (drive.angle_rad - count / encoder.count_rad) * self._constants.drive.table_per_motor
+        self.disconnect()
+        self._registers = self._interpreter.power_on()._replace(latched_count=wrap_int32(count))
+        self._state = self._woken(drive)
+        self._resting = False
+
+    @property
+    def received_queue(self) -> int:
+        """Bytes on their way to the firmware."""
+        return self._serial.uart.waiting_count
+
+    @property
+    def outgoing(self) -> bytes:
+        """Bytes of replies that have not left yet."""
+        return self._serial.uart.outgoing
+
+    def ticks_until_sent(self, wanted: int) -> int | None:
+        """Return the ticks until `wanted` bytes may have left, or a line comes that may bring them; None if neither."""
+        return self._serial.ticks_until_sent(wanted, self.tick)
+
+    def status(self) -> TableStatus:
+        """Return what can be seen of the table now."""
+        return table_status(
+            self.config,
+            self._state,
+            self._serial.uart,
+            encoder=self._constants.encoder,
+            tick=self.tick,
+            latched_count=self._registers.latched_count,
+            load_torque_Nm=self._load_torque_Nm,
+            true_zero_rad=self._true_zero_rad,
+        )
+
+    def snapshot(self) -> Snapshot:
+        """Return a copy of everything that the table's future depends on."""
+        return copy.deepcopy(
+            Snapshot(
+                self.tick,
+                self._constants,
+                self._state,
+                self._registers,
+                self._serial,
+                self._triggers,
+                self._faults,
+                self._load_torque_Nm,
+                self._true_zero_rad,
+            )
+        )
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot of a table with this configuration."""
+        self._owed_ticks = 0
+        (
+            self.tick,
+            self._constants,
+            self._state,
+            self._registers,
+            self._serial,
+            self._triggers,
+            self._faults,
+            self._load_torque_Nm,
+            self._true_zero_rad,
+        ) = copy.deepcopy(snapshot)
+        self._resting = False
+
+    def advance(self, ticks: int) -> None:
+        """Let simulated time pass."""
+        if ticks < 0:
+            raise ValueError(f"time cannot go back by {-ticks} ticks")
+        end = self.tick + ticks
+        while self.tick < end:
+            event = self.tick if self._is_busy() else self._next_event(end)
+            if event <= self.tick:
+                self._advance_watched()
+            else:
+                self._advance_undisturbed(event)
+        self._serve_faults()
+        if self._run is None:
+            self._pay()
+
+    def _is_busy(self) -> bool:
+        """Return whether each tick needs a look: at the line, by the observer, or for a drive that is not sound."""
+        return self._serial.needs_each_tick or self.observer is not None or is_faulty(self._faults)
+
+    def _next_event(self, end: int) -> int:
+        """Return the tick, `end` at the latest, at which something comes from outside.
+
+        That is an edge, a whole line, or a fault that begins, ends or lets a reply go.
+        """
+        line = self._serial.ticks_until_line()
+        line_tick = None if line is None else self.tick + line
+        events = (self._triggers.next_tick, self._faults.next_tick, self._serial.held_until, line_tick)
+        return min([end, *(tick for tick in events if tick is not None)])
+
+    def _advance_undisturbed(self, end: int) -> None:
+        """Pass ticks in which nothing comes from outside; a state that repeats itself stays to the end."""
+        ticks = end - self.tick
+        self._owed_ticks += ticks
+        self.tick = end
+        self._serial.pass_ticks(ticks, end, self._answer)
+        self._serial.overheard()  # and forgotten: nobody watches
+
+    @property
+    def _state(self) -> TableState:
+        """Plant and controller at the present tick."""
+        self._pay()
+        return self._past_state
+
+    @_state.setter
+    def _state(self, state: TableState) -> None:
+        self._past_state = state
+
+    def _pay(self) -> None:
+        """Let the ticks pass that plant and controller are behind."""
+        ticks, self._owed_ticks = self._owed_ticks, 0
+        if ticks and not self._resting:
+            run = self._run or run_undisturbed
+            self._past_state, self._resting = run(self._constants, self._past_state, self._load_torque_Nm, ticks)
+
+    def _advance_watched(self) -> None:
+        """Pass one tick in which the line, an edge, a fault or the observer has its turn."""
+        self._serve_faults()
+        before = self._state.drive
+        self._step()
+        while (fraction := self._triggers.take(self.tick)) is not None:
+            tick_s, end_rad = self._constants.drive.tick_s, self._state.drive.angle_rad
+            self._see_edge(angle_within_tick(before.angle_rad, end_rad, before.speed_rad_s, tick_s, fraction))
+        self.tick += 1
+        if not self._serial.uart.idle:
+            self._serial.advance(self.tick, self._answer)
+        heard, said = self._serial.overheard()
+        if self.observer is not None:
+            self.observer(self.status(), heard, said)
+
+    def _step(self) -> None:
+        """Take plant and controller one tick on, in whatever state a fault has left them."""
+        constants, state, torque_Nm = self._constants, self._state, self._load_torque_Nm
+        if is_faulty(self._faults):
+            supply_V = self.config.driver.supply_V
+            self._constants, self._state = faulty_step(self._faults, constants, state, torque_Nm, supply_V)
+        else:
+            self._state = step(constants, state, torque_Nm)
+        self._resting = False
+
+    def _serve_faults(self) -> None:
+        """Let faults begin and end, and replies go on that were held back."""
+        if self._faults.begin_tick(self.tick):
+            self.disconnect()
+        self._serial.release(self.tick)
+
+    def _see_edge(self, angle_rad: float) -> None:
+        """Latch the position at an edge of the trigger, unless a fault hides the edge."""
+        if self._triggers.sees_edge(self.tick):
+            latched_count = count_at(self._constants.encoder, angle_rad)
+            self._registers = self._registers._replace(latched_count=latched_count)
+
+    def _answer(self, line: bytes | ErrorCode) -> bytes:
+        """Carry out a line that the firmware has read, once the faults that wait for it have begun."""
+        if self._faults.begin_line(self.tick):
+            self.disconnect()
+        return self._reply(line if isinstance(line, ErrorCode) else decode_command(line))
+
+    def _reply(self, command: Command | ErrorCode) -> bytes:
+        """Carry out a command and return its reply; in strict Table 1 mode a refused line has none."""
+        if isinstance(command, Command):
+            before = self._state.firmware
+            reply, controller, self._registers = self._interpreter.execute(command, before, self._registers)
+            if controller is not before:
+                self._state = self._state._replace(firmware=controller)
+                self._resting = False
+        else:
+            reply = Refusal(command)
+        serial = self.config.serial
+        return b"" if serial.strict and isinstance(reply, Refusal) else encode_reply(reply, serial.decimals)
+
+    def _woken(self, drive: DriveState) -> TableState:
+        return woken(self._constants, drive, Profile.of(self._registers.speed, self._registers.acceleration))

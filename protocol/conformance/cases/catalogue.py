@@ -1,0 +1,41 @@
+"""The catalogue of all cases, and how some of them are chosen by their ids."""
+
+import re
+from collections.abc import Sequence
+
+import protocol.conformance.cases  # noqa: F401  # fills the register
+from protocol.conformance.cases.case import CASES, Case
+
+
+def all_cases() -> list[Case]:
+    """Return every case in the order of the specification."""
+    return sorted(CASES.values(), key=lambda one: ([int(part) for part in re.findall(r"\d+", one.clause.number)]))
+
+
+def chosen_cases(prefixes: Sequence[str]) -> list[Case]:
+    """Return the cases whose id begins with one of the prefixes, numbers taken whole: `4.1/1` is not `4.1/10`.
+
+    A prefix that ends in `$` is a whole id: `7.1/1$` is not `7.1/1:backwards`.
+
+    Raises:
+        ValueError: a prefix chooses none.
+    """
+    everything = all_cases()
+    for prefix in prefixes:
+        if not prefix:
+            raise ValueError("a prefix is empty; leave the option out for all cases")
+        if not any(_begins(one.id, prefix) for one in everything):
+            raise ValueError(f"no case begins with {prefix}; --list shows all")
+    return [one for one in everything if not prefixes or any(_begins(one.id, prefix) for prefix in prefixes)]
+
+
+def only(case: Case) -> str:
+    """Return the prefix that chooses this case and no other: its id, with `$` behind it where others begin so too."""
+    return case.id if chosen_cases([case.id]) == [case] else f"{case.id}$"
+
+
+def _begins(identifier: str, prefix: str) -> bool:
+    if prefix.endswith("$"):
+        return identifier == prefix[:-1]
+    rest = identifier.removeprefix(prefix)
+    return identifier.startswith(prefix) and not (prefix[-1:].isdigit() and rest[:1].isdigit())

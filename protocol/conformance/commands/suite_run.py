@@ -1,0 +1,144 @@
+"""A run of the suite from the command line: the verdicts on stdout, and the files that it leaves."""
+
+import argparse
+import os
+import shlex
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+
+from protocol.clock import WallClock
+from protocol.conformance.bench.host_watch import watch_in
+from protocol.conformance.bench.ports import described, is_simulated
+from protocol.conformance.bench.stand import stand_beside
+from protocol.conformance.bench.wire import RecordedPort, ReopenablePort
+from protocol.conformance.cases.case import Case
+from protocol.conformance.cases.catalogue import only
+from protocol.conformance.commands.command_line import UsageError, confirm, say, show_progress, tell
+from protocol.conformance.judgement.verdict import Verdict
+from protocol.conformance.profile.profile import Profile
+from protocol.conformance.results.record import Header, count_verdicts, write_junit, write_record
+from protocol.conformance.results.report import write_report
+from protocol.conformance.session.suite import Outcome, session_at
+from protocol.interrupts import status_after
+
+_BAD = {Verdict.FAIL, Verdict.ERROR}
+_NO_FILES = 2
+
+
+def run_suite(options: argparse.Namespace, profile: Profile, port: ReopenablePort, cases: Sequence[Case]) -> int:
+    """Run cases on the table at a port, leave record, report and JUnit's XML, and return the exit status.
+
+    Raises:
+        UsageError: the files cannot be put where they should go, or nobody agreed to the table's being moved.
+        SessionError: what is at the port cannot be tested.
+        StandError: what is beside it does not work.
+    """
+    junit = _junit_file(options)
+    confirm(options.port, options.yes, profile, port)
+    begun = None if is_simulated(port) else datetime.now().astimezone().isoformat(timespec="seconds")
+    outcomes: list[Outcome] = []
+    durations_s: list[float] = []
+    status = 0
+    with watch_in(simulated=is_simulated(port)) as watch:
+        stand = stand_beside(port, options.control, profile)
+        session = session_at(options.port, RecordedPort(port), profile, stand, options.seed, watch)
+        header = Header(
+            described(options.port),
+            session.profile,
+            options.seed,
+            session.home_deg,
+            sorted(session.capabilities),
+            begun,
+        )
+        try:
+            session.run(cases, _progress(outcomes, durations_s, len(cases), options))
+        except KeyboardInterrupt as interrupt:
+            status = status_after(interrupt)
+            say(f"interrupted after {len(outcomes)} of {len(cases)} cases; {session.how_it_was_left}")
+    tell(", ".join(f"{count} {verdict}" for verdict, count in count_verdicts(outcomes).items()) or "nothing was run")
+    written = _write(options, header, outcomes, durations_s, junit)
+    return status or (int(any(outcome.verdict in _BAD for outcome in outcomes)) if written else _NO_FILES)
+
+
+def _junit_file(options: argparse.Namespace) -> Path:
+    """Return where JUnit's XML goes, when all files can be written."""
+    junit: Path = options.junit or options.out / "junit.xml"
+    if junit.is_dir():
+        raise UsageError(f"--junit {junit}: is a directory; name a file")
+    if junit in {options.out / "record.json", options.out / "report.html"}:
+        raise UsageError(f"--junit {junit}: goes to another file of --out; name another")
+    for directory in (options.out, junit.parent):
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UsageError(f"{directory}: is no directory and cannot become one: {error.strerror}") from error
+        if not os.access(directory, os.W_OK | os.X_OK):
+            raise UsageError(f"{directory}: cannot be written to; name another directory, or change its rights")
+    return junit
+
+
+def _write(
+    options: argparse.Namespace, header: Header, outcomes: Sequence[Outcome], durations_s: Sequence[float], junit: Path
+) -> bool:
+    """Write the files, and return whether all could be; one that cannot takes none of the others with it."""
+    report = options.out / "report.html"
+    writers = (
+        partial(write_record, options.out / "record.json", header, outcomes),
+        partial(write_junit, junit, header, outcomes, durations_s),
+        partial(write_report, report, header, outcomes, partial(_repeat, options)),
+    )
+    done = [_is_done(write) for write in writers]
+    if all(done):
+        say(f"the report is {report}")
+    return all(done)
+
+
+def _is_done(write: Callable[[], None]) -> bool:
+    try:
+        write()
+    except OSError as error:
+        say(str(error))
+        return False
+    return True
+
+
+def _progress(
+    outcomes: list[Outcome], durations_s: list[float], total: int, options: argparse.Namespace
+) -> Callable[[Outcome], None]:
+    """Return what takes in each outcome: it prints those worth reading, and on a terminal shows how far the run is.
+
+    How long a case took in real time, which is another than a simulated table's, is kept apart from its outcome.
+    """
+    clock = WallClock()
+    last_s = clock.now_s()
+
+    def take(outcome: Outcome) -> None:
+        nonlocal last_s
+        now_s = clock.now_s()
+        outcomes.append(outcome)
+        durations_s.append(now_s - last_s)
+        last_s = now_s
+        show_progress("")
+        for run in outcome.spoiled:
+            say(f"{outcome.case.id} was run again, since {run}")
+        if outcome.verdict is not Verdict.PASS:
+            tell(f"{outcome.verdict:9} {outcome.case.id}: {outcome.reason}")
+        if outcome.verdict in _BAD:
+            tell(f"          {outcome.case.clause.level}: {outcome.case.clause.text}")
+            tell(f"          again: {_repeat(options, outcome.case)}")
+        if len(outcomes) < total:
+            show_progress(f"{len(outcomes)}/{total} {outcome.case.id}")
+
+    return take
+
+
+def _repeat(options: argparse.Namespace, case: Case) -> str:
+    """Return the command that repeats one case alone."""
+    words = ["python", "-m", "protocol.conformance", "--port", options.port]
+    for name in ("profile", "control"):
+        if getattr(options, name) is not None:
+            words += [f"--{name}", str(getattr(options, name))]
+    words += ["--case", only(case), "--seed", str(options.seed), "--out", str(options.out / "again")]
+    return shlex.join(words + ["--yes"] * options.yes)

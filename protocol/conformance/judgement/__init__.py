@@ -1,0 +1,1 @@
+"""What a table should do, and the verdict on what it did."""

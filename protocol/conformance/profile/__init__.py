@@ -1,0 +1,1 @@
+"""What is known of a table under test, and what the specification says."""

@@ -1,0 +1,1 @@
+"""The kit as a part of pytest."""

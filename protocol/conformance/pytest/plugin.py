@@ -1,0 +1,53 @@
+"""A plug-in for pytest: the fixture `rotary_table` for anybody's tests, and the options of the conformance suite.
+
+It is loaded by every run of pytest where this package is installed, so that it imports nothing before it is asked for.
+"""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from protocol.conformance.pytest.fixture import RotaryTable
+
+IN_PROCESS = "emulator://"
+PTY = "pty"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options of the table under test."""
+    add = parser.getgroup("rotary table").addoption
+    add(
+        "--table-port",
+        metavar="URL",
+        default=IN_PROCESS,
+        help="the table for the fixture rotary_table and for the conformance suite: a device, a URL of pyserial's, or "
+        f"`{PTY}` for a fresh stand-in on a pseudo-terminal (default: {IN_PROCESS}, in process and in simulated time)",
+    )
+    add("--table-profile", metavar="FILE", type=Path, help="TOML file of what is known of the table")
+    add("--table-control", metavar="PATH", type=Path, help="the control channel of the stand-in at the port")
+    add("--table-yes", action="store_true", help="a real table may be moved as the profile says")
+
+
+@pytest.fixture
+def rotary_table_port(pytestconfig: pytest.Config) -> str:
+    """The port of `rotary_table`: what `--table-port` says. A module that needs another overrides this fixture."""
+    return str(pytestconfig.getoption("--table-port"))
+
+
+@pytest.fixture
+def rotary_table(
+    rotary_table_port: str, pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator["RotaryTable"]:
+    """A table that is fresh for each test: `.client` talks to it, `.url` opens it, `.trigger()` is the probe."""
+    from protocol.conformance.pytest.fixture import RotaryTable, pty_stand_in  # noqa: PLC0415 - see the module's docstring
+
+    control = pytestconfig.getoption("--table-control")
+    with ExitStack() as stack:
+        url = rotary_table_port
+        if url == PTY:
+            url, control = stack.enter_context(pty_stand_in(tmp_path_factory.mktemp("table")))
+        yield stack.enter_context(RotaryTable(url, control, pytestconfig.getoption("--table-profile")))

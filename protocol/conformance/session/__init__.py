@@ -1,0 +1,1 @@
+"""One session with a table: first contact, then the cases in turn."""

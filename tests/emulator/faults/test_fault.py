@@ -1,0 +1,90 @@
+"""The catalogue: what is a fault, by the same names and numbers everywhere."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from emulator.config.table_config import load_config
+from emulator.config.toml_section import ConfigError
+from emulator.faults.fault import KINDS, FaultError, fault_from, parameters_of
+from emulator.server.control_commands import COMMANDS
+
+EXAMPLE: dict[str, dict[str, float]] = {
+    "drop": {"probability": 0.3},
+    "flip": {"probability": 0.1},
+    "delay": {"seconds": 0.2},
+    "half-reply": {"bytes": 3},
+    "late-reply": {"seconds": 2.0},
+    "silence": {},
+    "hang-up": {"for_s": 2.0},
+    "wrong-baud": {"baud": 4800},
+    "stall": {},
+    "extra-load": {"torque_Nm": 0.3},
+    "supply-sag": {"supply_V": 3.0},
+    "stuck-pwm": {"duty": 0.3},
+    "one-sided": {"direction": 1},
+    "lost-counts": {"probability": 0.1},
+    "swapped-encoder": {},
+    "dead-encoder": {},
+    "missed-trigger": {"probability": 1.0},
+    "bounced-trigger": {"edges": 3, "within_s": 0.02},
+}
+
+
+def test_every_fault_has_an_example_here() -> None:
+    assert EXAMPLE.keys() == KINDS.keys()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_three_ways_take_the_same_names_and_numbers(kind: str, tmp_path: Path) -> None:
+    numbers = EXAMPLE[kind] | {"at_s": 1.0}
+    file = tmp_path / "faulty.toml"
+    file.write_text(
+        "[[faults]]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in {"fault": kind, **numbers}.items())
+    )
+    (from_file,) = load_config(file).faults
+    got: list[Any] = []
+    stand: Any = type("Stand", (), {"inject": lambda _, fault: got.append(fault)})()
+    COMMANDS[f"fault-{kind}"].run(stand, numbers)
+    assert got == [from_file] == [fault_from(kind, numbers)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "numbers", "words"),
+    [
+        ("gremlins", {}, "'gremlins' is not a fault; there are drop, "),
+        ("drop", {}, "drop: probability is missing; it must be a number from 0 to 1"),
+        ("drop", {"probability": 2}, "drop: probability is 2; it must be a number from 0 to 1"),
+        ("drop", {"probability": math.nan}, "drop: probability is nan"),
+        (
+            "drop",
+            {"probability": 1, "direction": 0.5},
+            "drop: direction is 0.5; it must be a whole number from -1 to 1",
+        ),
+        ("bounced-trigger", {"edges": 2.5, "within_s": 1}, "bounced-trigger: edges is 2.5; it must be a whole number"),
+        ("stall", {"at_command": 1.5}, "stall: at_command is 1.5; it must be a whole number"),
+        ("stall", {"force": 2}, "stall: force is not known; it takes at_s, at_command, for_s"),
+        ("half-reply", {"bytes": 2, "for_s": 1}, "half-reply: for_s is not known"),
+        ("stall", {"at_s": 1, "at_command": 1}, "stall: at_s and at_command are two beginnings"),
+    ],
+)
+def test_what_is_no_fault_is_refused_in_one_line(
+    kind: str, numbers: dict[str, float], words: str, tmp_path: Path
+) -> None:
+    with pytest.raises(FaultError, match=words):
+        fault_from(kind, numbers)
+    file = tmp_path / "faulty.toml"
+    file.write_text(
+        "[[faults]]\n"
+        + "".join(f"{key} = {json.dumps(value).lower()}\n" for key, value in {"fault": kind, **numbers}.items())
+    )
+    with pytest.raises(ConfigError, match=f"faulty.toml: faults: {words}"):
+        load_config(file)
+
+
+def test_help_and_parameters_agree() -> None:
+    for kind in KINDS:
+        assert COMMANDS[f"fault-{kind}"].parameters == parameters_of(kind)
