@@ -17,7 +17,8 @@ from random import Random
 from typing import NamedTuple
 
 from tools.command_line import ended
-from tools.mutation import MODULES, Mutation, mutations_of, planted
+from emulator.fast_ticks import LOADED_TICKS
+from tools.mutation import COMPILED, MODULES, Mutation, mutations_of, planted
 from tools.progress import Progress
 
 EXPLAINED = Path(__file__).with_name("mutants.toml")
@@ -53,12 +54,13 @@ def verdict_on(mutation: Mutation, seed: int) -> str:
     from protocol.conformance.profile.profile import load_profile  # noqa: PLC0415
     from protocol.conformance.session.suite import Session, SessionError  # noqa: PLC0415
 
-    RUN.warm_up_ticks = sys.maxsize  # compiled code would be that of the table without the mutation
+    # Compiled code is that of the table without the mutation.
+    RUN.warm_up_ticks = sys.maxsize if mutation.module in COMPILED else LOADED_TICKS
     planted(mutation)
     try:
         port = Serial("emulator://", timeout=1)
         session = Session(RecordedPort(port), load_profile(), InProcess(port.table), seed)
-        for case in all_cases():
+        for case in sorted(all_cases(), key=lambda case: case.travel_deg):  # those that take little time first
             outcome = session.run_case(case)
             if outcome.verdict in {Verdict.FAIL, Verdict.ERROR}:
                 return f"{case.id}: {outcome.reason}"

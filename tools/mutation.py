@@ -24,6 +24,9 @@ MODULES = (
 )
 """What the firmware of the emulated table consists of; its plant is not what the suite tests."""
 
+COMPILED = ("emulator.encoder", "emulator.firmware", "emulator.fixed_point", "emulator.pid", "emulator.profiler")
+"""Those of which numba compiles functions."""
+
 _SWAPPED: dict[type[ast.AST], type[ast.AST]] = {
     ast.Lt: ast.LtE,
     ast.LtE: ast.Lt,

@@ -18,6 +18,8 @@ _WRAPS = (
 
 _LOW = Decimal("0.15")
 """An S or an A that is a third lower with one decimal."""
+_SLOW_S, _RAMP_S = 4.7, 3.3
+"""In which such an S, or an A, makes a difference of a quarter of a degree."""
 
 _BAD_NUMBER = ErrorCode.BAD_NUMBER
 _OUT_OF_RANGE = ErrorCode.OUT_OF_RANGE
@@ -103,16 +105,18 @@ def all_decimals_count(rig: Rig) -> None:
 
 @case("4.1/8:settings", travel_deg=3)
 def all_decimals_of_s_and_a_count(rig: Rig) -> None:
-    """Move with an S, then with an A, that are much lower when a decimal is cut or does not fit a register."""
+    """Begin motions with an S, then with an A, that are much lower when a decimal is cut or does not fit a register."""
     rig.set_speed_text(_irregular(_LOW, 25))
-    rig.move_by(0.8)
-    rig.follow()
+    rig.move_by(3)
+    rig.follow(_SLOW_S)
     rig.full_settings()
+    rig.move_to(0)
     rig.finish("S with 25 decimals")
     rig.set_acceleration_text(_irregular(_LOW, 11))
-    rig.move_by(1.5)
-    rig.follow()
+    rig.move_by(3)
+    rig.follow(_RAMP_S)
     rig.full_settings()
+    rig.move_to(0)
     rig.finish("A with 11 decimals")
 
 

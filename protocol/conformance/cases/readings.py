@@ -40,10 +40,11 @@ def a_position_is_of_the_time_of_its_reply(rig: Rig) -> None:
 
 @case("4.2/3", travel_deg=370)
 def the_position_is_unwrapped(rig: Rig) -> None:
-    """Turn by one turn and 10 degrees."""
+    """Turn by one turn and 10 degrees, there and back."""
     rig.settings(rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2)
-    rig.move_to(370)
-    rig.finish()
+    for target in (370, 0):
+        rig.move_to(target)
+        rig.finish(f"at {target}")
 
 
 @case("4.2/4", travel_deg=10)

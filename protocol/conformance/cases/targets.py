@@ -20,11 +20,11 @@ _MARGIN_S = 0.002
 _OUT_OF_RANGE = ErrorCode.OUT_OF_RANGE
 
 
-@case("4.4/1", travel_deg=370)
+@case("4.4/1", travel_deg=190)
 def p_never_takes_the_short_way(rig: Rig) -> None:
-    """Turn by one turn and 10 degrees, backwards."""
+    """Turn backwards by more than half a turn; 4.2/3 turns by more than a whole one, both ways."""
     rig.settings(rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2)
-    rig.move_to(-370)
+    rig.move_to(-190)
     rig.finish()
 
 
@@ -86,9 +86,11 @@ def increments_add_up(rig: Rig) -> None:
         rig.wire.clock.sleep_s(_PAUSE_S)
     rig.finish("ten increments")
     start_deg, count = 10 * 0.3333 + rig.home_deg, _little_increments(rig)
+    line = b"R%.5f" % _LITTLE_DEG
+    motion_s = 2 * sqrt(_LITTLE_DEG / rig.rate_deg_s2) + _MARGIN_S
     for _ in range(count):
-        rig.expect(b"R %f" % _LITTLE_DEG)
-        rig.wire.clock.sleep_s(2 * sqrt(_LITTLE_DEG / rig.rate_deg_s2) + _MARGIN_S)
+        rig.expect(line)
+        rig.wire.clock.sleep_s(max(0.0, motion_s - len(line) * rig.profile.byte_s))  # the next line takes time too
     moved_deg = float(rig.wait_for_rest()) - start_deg
     rig.measure(f"{count} times {_LITTLE_DEG:f}", moved_deg, "deg", *rig.near(count * _LITTLE_DEG))
 
