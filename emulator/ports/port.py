@@ -9,20 +9,19 @@ class Arrival(NamedTuple):
     """What clients did since the last look.
 
     `left_before` and `left_after` say that a client went away before or after `data` was sent: a half line that it
-    left behind ends there. Of so many lines of `data`, from its first, as are `doubtful_lines` nobody
-    can tell whose they are: they may not be carried out.
+    left behind ends there. `is_doubtful` says that the bytes are of several clients and that nobody can tell where
+    those of one end: their lines may not be carried out.
     """
 
     left_before: bool = False
     data: bytes = b""
     left_after: bool = False
-    doubtful_lines: int = 0
+    is_doubtful: bool = False
 
 
-def spoiled(data: bytes, lines: int) -> bytes:
-    """Return bytes whose first lines are not carried out: each that is not empty is refused for a bad byte."""
-    pieces = data.split(b"\r")
-    return b"\r".join([_BAD_BYTE + piece if piece else piece for piece in pieces[:lines]] + pieces[lines:])
+def spoiled(data: bytes) -> bytes:
+    """Return bytes whose lines are not carried out: each that is not empty is refused for a bad byte."""
+    return b"\r".join(piece and _BAD_BYTE + piece for piece in data.split(b"\r"))
 
 
 class Port(Protocol):

@@ -20,7 +20,7 @@ from emulator.ports.outbox import Outbox
 from emulator.ports.port import Arrival
 from emulator.ports.readiness import wait_for
 from emulator.ports.terminal_baud import get_baud, set_baud
-from emulator.ports.visit import Visit, doubtful_lines
+from emulator.ports.visit import Visit
 
 READ_BYTES = 256
 """What one look takes of a client that stays."""
@@ -105,16 +105,16 @@ class PtyPort:
         if data and visit.another_came and not visit.another_wrote:
             visit = self._wait_for_a_write(visit)
         self._let_go()
-        doubtful = doubtful_lines(visit.writers, data)
-        if doubtful and not self._said_doubtful:
+        is_doubtful = bool(data) and visit.is_doubtful
+        if is_doubtful and not self._said_doubtful:
             self._warn(
                 f"two programs used {self.name} one right after the other, and nobody can tell which bytes are whose: "
-                "what may be of both is not carried out"
+                "what came in one piece of both is not carried out"
             )
             self._said_doubtful = True
         if visit.another_wrote:
-            return Arrival(left_before=True, data=data, doubtful_lines=doubtful)
-        return Arrival(data=data, left_after=True, doubtful_lines=doubtful)
+            return Arrival(left_before=True, data=data, is_doubtful=is_doubtful)
+        return Arrival(data=data, left_after=True, is_doubtful=is_doubtful)
 
     def send(self, data: bytes) -> None:
         """Give replies to the client; they are lost when nobody has the port open, or nobody reads it."""

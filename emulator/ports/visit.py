@@ -24,13 +24,7 @@ class Visit(NamedTuple):
         return self.another_came and self.counted
 
 
-def doubtful_lines(writers: int, data: bytes) -> int:
-    """Return how many lines of `data`, from its first, may be half of one client's and half of another's.
-
-    Nobody can tell where one client's bytes end. When the lines may be one for each client, as those of commands of a
-    shell, a glued one can only be the first of them; otherwise it can be any.
-    """
-    ends = data.count(b"\r")
-    if writers < 2 or not data:
-        return 0
-    return 1 if ends == writers and data.endswith(b"\r") else ends + 1
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether the bytes may be of several clients: any line may then be half of one's and half of another's."""
+        return self.writers > 1

@@ -203,7 +203,7 @@ class Server:
             if arrival.left_before:
                 self._table.disconnect()
             if arrival.data:
-                self._table.receive(spoiled(arrival.data, arrival.doubtful_lines))
+                self._table.receive(spoiled(arrival.data) if arrival.is_doubtful else arrival.data)
                 self._send_replies()
             if arrival.left_after:
                 self._leaving = True

@@ -46,6 +46,16 @@ def test_a_half_line_is_not_glued_to_the_next_clients_first(stand_in: Start) -> 
         assert ask(port, b"H") == b"H 0.0\r"
 
 
+HALVES = [
+    (b"R 9", b"0\r"),
+    (b"H\rR 9", b"0\rH\r"),
+    (b"S 20\rR 9", b"0\r"),
+    (b"R", b" 90\r"),
+    (b"P 9", b"0\r\r"),
+]
+"""What one client leaves behind, and what would make a command of it."""
+
+
 @pytest.mark.parametrize("baud", ["0", "9600"])
 def test_half_a_command_is_never_finished_by_the_next_client_however_fast_it_comes(
     stand_in: Start, tmp_path: Path, baud: str
@@ -54,7 +64,7 @@ def test_half_a_command_is_never_finished_by_the_next_client_however_fast_it_com
     table = stand_in("--pty", "--baud", baud, "--control", str(control))
     chance = random.Random(int(baud))  # noqa: S311  # a test's draw
     for _ in range(60):
-        first, second = chance.choice([(b"R 9", b"0\r"), (b"H\rR 9", b"0\rH\r"), (b"R", b" 90\r"), (b"P 9", b"0\r\r")])
+        first, second = chance.choice(HALVES)
         for data in (first, second):
             client = os.open(table.port, os.O_RDWR | os.O_NOCTTY)
             os.write(client, data)
