@@ -23,7 +23,6 @@ class Visit(NamedTuple):
         """Whether a client is there who came when another had left, and has written."""
         return self.another_came and self.counted
 
-
     @property
     def is_doubtful(self) -> bool:
         """Whether the bytes may be of several clients: any line may then be half of one's and half of another's."""

@@ -13,7 +13,7 @@ import pytest
 
 from emulator import control_client
 from emulator.trace import read_trace
-from tests.emulator.served import Start, WaitUntil, ask, open_port, wait_for_position
+from tests.emulator.served import StandIn, Start, WaitUntil, ask, open_port, wait_for_position
 
 pytestmark = [
     pytest.mark.realtime,
@@ -219,3 +219,48 @@ def test_what_cannot_be_used_is_one_line_and_status_2(arguments: list[str], word
 def test_help_shows_an_example() -> None:
     done = subprocess.run([sys.executable, "-m", "emulator", "--help"], capture_output=True, text=True, check=True)
     assert "example:" in done.stdout
+
+
+def stopped_for(table: StandIn, duration_s: float) -> float:
+    """Stop the process with SIGSTOP, let it go on, and return for how long it certainly stood, in seconds."""
+    state = Path(f"/proc/{table.process.pid}/stat")
+    table.process.send_signal(signal.SIGSTOP)
+    while state.read_text().rpartition(")")[2].split()[0] != "T":
+        time.sleep(0.001)
+    begin_s = time.monotonic()
+    time.sleep(duration_s)
+    end_s = time.monotonic()
+    table.process.send_signal(signal.SIGCONT)
+    return end_s - begin_s
+
+
+@pytest.mark.parametrize("command", [b"H", b"P 100"], ids=["at rest", "in motion"])
+def test_a_long_stop_of_the_process_is_left_out_at_rest_and_in_motion(
+    stand_in: Start, tmp_path: Path, command: bytes
+) -> None:
+    control = tmp_path / "control"
+    table = stand_in("--pty", "--control", str(control))
+    with open_port(table.port) as port:
+        assert ask(port, b"S 2") == b"OK\r"
+        ask(port, command)
+        time.sleep(0.5)
+        before_s, before = time.monotonic(), control_client.request(control, "state")
+        stood_s = stopped_for(table, 0.8)
+        after, after_s = control_client.request(control, "state"), time.monotonic()
+    passed_s = (after["tick"] - before["tick"]) / 1000
+    assert (
+        passed_s <= after_s - before_s - stood_s + 0.001
+    )  # not even half a second is made up for
+    speed_deg_s = 2.0 if command == b"P 100" else 0.0
+    assert after["reference_deg"] - before["reference_deg"] == pytest.approx(speed_deg_s * passed_s, abs=1e-3)
+    table.wait_for_words("simulated time falls behind")
+
+
+def test_a_short_stop_of_the_process_is_made_up_for(stand_in: Start, tmp_path: Path) -> None:
+    control = tmp_path / "control"
+    table = stand_in("--pty", "--control", str(control))
+    before, before_s = control_client.request(control, "state"), time.monotonic()
+    stopped_for(table, 0.2)
+    after_s, after = time.monotonic(), control_client.request(control, "state")
+    # A busy machine may have stopped it for longer.
+    assert (after["tick"] - before["tick"]) / 1000 >= after_s - before_s - 0.001 or "falls behind" in table.stderr
