@@ -27,15 +27,15 @@ _CPU_S = 120
 
 
 class Explanation(NamedTuple):
-    """Why mutants may come through: those of a place, or only one change there."""
+    """Why mutants may come through: all of a place, or only changes there that contain some text."""
 
     where: str
     change: str
     reason: str
 
     def holds_for(self, mutation: Mutation) -> bool:
-        """Return whether it is about a mutation: in this function or class, and with this change if one is named."""
-        return f"{mutation.where}.".startswith(f"{self.where}.") and self.change in {"", mutation.change}
+        """Return whether it is about a mutation: in this function or class, and with this text in its change."""
+        return f"{mutation.where}.".startswith(f"{self.where}.") and self.change in mutation.change
 
 
 def explanations(file: Path = EXPLAINED) -> list[Explanation]:

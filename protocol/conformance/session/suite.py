@@ -28,7 +28,7 @@ from protocol.errors import TableError
 
 __all__ = ["Outcome", "Session", "SessionError", "session_at"]
 
-_RUNS = 3
+_RUNS = 5
 """How often a case is run when its machine spoils it."""
 _START_DEG = 0.75
 """A recorded case begins within this of its place: it may begin half a degree from a whole one."""

@@ -2,6 +2,9 @@
 
 import dataclasses
 
+import pytest
+
+from emulator.faults import fault_from
 from emulator.protocol_emulator import Serial
 from protocol.conformance.bench.stand import InProcess
 from protocol.conformance.bench.wire import RecordedPort
@@ -11,6 +14,7 @@ from protocol.conformance.judgement.rig import Rig
 from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import load_profile
 from protocol.conformance.session.suite import Outcome, Session
+from protocol.messages import ErrorCode
 from tests.protocol.conformance.mutants import Mutant, port_to
 
 
@@ -79,13 +83,34 @@ def test_a_machine_that_is_never_calm_is_an_error_and_no_fault_of_the_table() ->
 
     assert outcome.verdict is Verdict.ERROR
     assert outcome.reason.startswith("this machine was 1.3 s late: ")
-    assert len(outcome.spoiled) == 2
+    assert len(outcome.spoiled) == 4
 
 
 def test_a_late_machine_does_not_make_a_pass_doubtful() -> None:
     outcome = outcome_on(BusyMachine(late_runs=9), failing_at_first(0))
 
     assert (outcome.verdict, outcome.spoiled) == (Verdict.PASS, ())
+
+
+class LateInMotion(Mutant):
+    """a reply in fifteen comes a fifth of a second late, as on a busy machine"""
+
+    count = 0
+
+    def _answer(self, line: bytes | ErrorCode) -> bytes:
+        reply = super()._answer(line)
+        self.count += 1
+        if self.moving and self.count % 15 == 0:
+            self.inject(fault_from("late-reply", {"seconds": 0.2}))
+        return reply
+
+
+@pytest.mark.parametrize("identifier", ["7.1/1$", "7.1/3$", "7.1/5$"])
+def test_a_late_reading_tells_nothing_about_speed_and_acceleration(identifier: str) -> None:
+    port = port_to(LateInMotion)
+    session = Session(RecordedPort(port), load_profile(), InProcess(port.table))
+    outcome = session.run_case(*chosen_cases([identifier]))
+    assert outcome.verdict is not Verdict.FAIL, outcome.reason
 
 
 class BusyWhileTheTableTurns(BusyMachine):
