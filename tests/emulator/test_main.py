@@ -250,9 +250,7 @@ def test_a_long_stop_of_the_process_is_left_out_at_rest_and_in_motion(
         time.sleep(0.1)  # in which a clock that is ahead would be caught up with
         after, after_s = control_client.request(control, "state"), time.monotonic()
     passed_s = (after["tick"] - before["tick"]) / 1000
-    assert (
-        passed_s <= after_s - before_s - stood_s + 0.001
-    )  # not even half a second is made up for
+    assert passed_s <= after_s - before_s - stood_s + 0.001  # not even half a second is made up for
     speed_deg_s = 2.0 if command == b"P 100" else 0.0
     assert after["reference_deg"] - before["reference_deg"] == pytest.approx(speed_deg_s * passed_s, abs=1e-3)
 

@@ -17,7 +17,6 @@ pytestmark = [
 ]
 
 
-@pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # pyserial's RFC 2217 client calls them
 @pytest.mark.parametrize("kind", ["--pty", "--tcp=0", "--rfc2217=0"])
 def test_a_serial_client_drives_the_table_and_preempts_a_motion(
     stand_in: Start, kind: str, wait_until: WaitUntil
@@ -32,6 +31,18 @@ def test_a_serial_client_drives_the_table_and_preempts_a_motion(
         assert ask(port, b"P -10") == b"OK\r"
         wait_for_position(port, b"H -10.0\r", wait_until)
         assert ask(port, b"Q") == b"ERR 1 unknown command\r"
+
+
+def test_a_read_time_out_is_not_negotiated_over_rfc2217(stand_in: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    table = stand_in("--rfc2217=0")
+    negotiations: list[None] = []
+    with open_port(table.port) as port:
+        monkeypatch.setattr(port, "_reconfigure_port", lambda: negotiations.append(None))
+        for timeout_s in (0.0, None, 5.0):
+            port.timeout = timeout_s
+            assert port.timeout == timeout_s
+        assert ask(port, b"H") == b"H 0.0\r"
+    assert not negotiations
 
 
 def test_both_ports_are_one_wire(stand_in: Start, wait_until: WaitUntil) -> None:

@@ -1,4 +1,4 @@
-"""The suite on a real pty and over TCP: a few short cases here, all of them in `.ci/conformance`."""
+"""The suite on a real pty, over TCP and over RFC 2217: a few short cases here, all of them in `.ci/conformance`."""
 
 import json
 import os
@@ -29,7 +29,7 @@ class StandIn:
         self.control = control
 
 
-@pytest.fixture(params=[("--pty",), ("--tcp", "0")], ids=["pty", "tcp"])
+@pytest.fixture(params=[("--pty",), ("--tcp", "0"), ("--rfc2217", "0")], ids=["pty", "tcp", "rfc2217"])
 def stand_in(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[StandIn]:
     control = tmp_path / "control"
     command = [sys.executable, "-m", "emulator", *request.param, "--control", str(control)]
