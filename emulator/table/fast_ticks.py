@@ -7,6 +7,7 @@ much, so that no session takes more than twice the time of the better choice.
 
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from importlib.util import find_spec
 from typing import Final
 
@@ -45,6 +46,7 @@ class FastTicks:
         self.warm_up_ticks = warm_up_ticks
         self._interpreted_ticks = 0
         self._compiled: Run | None = None
+        self._loaded: set[int] = set()
         self._is_hopeless = find_spec("numba") is None
 
     @property
@@ -65,8 +67,10 @@ class FastTicks:
             else:
                 assert self._compiled is not None
                 some = min(ticks, _LONGEST_CALL_TICKS)
-                with signals_wait():
+                kind = len(state.firmware.counts)  # what the types of constants and state depend on
+                with nullcontext() if kind in self._loaded else signals_wait():  # numba must not be broken into
                     state, resting = self._compiled(constants, state, load_torque_Nm, some)
+                self._loaded.add(kind)
             ticks -= some
         return state, resting
 

@@ -256,10 +256,12 @@ class Table:
 
     def _pay(self) -> None:
         """Let the ticks pass that plant and controller are behind."""
-        ticks, self._owed_ticks = self._owed_ticks, 0
-        if ticks and not self._resting:
+        if self._owed_ticks and not self._resting:
             run = self._run or run_undisturbed
-            self._past_state, self._resting = run(self._constants, self._past_state, self._load_torque_Nm, ticks)
+            state, resting = run(self._constants, self._past_state, self._load_torque_Nm, self._owed_ticks)
+            # In one statement without a call: Ctrl-C comes before it, and all is still owed, or after it.
+            self._past_state, self._resting, self._owed_ticks = state, resting, 0
+        self._owed_ticks = 0
 
     def _advance_watched(self) -> None:
         """Pass one tick in which the line, an edge, a fault or the observer has its turn."""

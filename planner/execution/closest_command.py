@@ -12,6 +12,7 @@ moment of the next command is known.
 
 import math
 from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import chain
 from typing import NamedTuple
 
@@ -65,15 +66,15 @@ class Step(NamedTuple):
         """How long it lasts."""
         return self.end_s - self.begin_s
 
-    def error(self, middle: ReferenceState, end: ReferenceState, ahead_deg_s: float) -> float:
-        """Return the squared error, in deg^2, of a reference with these states whose ramp is not over by so much."""
+    def error_of_end(self, end: ReferenceState, ahead_deg_s: float) -> float:
+        """Return the squared error, in deg^2, of a reference at the end whose ramp is not over by so much."""
         speed_weight = _SPEED_WEIGHT_AT_LIMIT if self.is_at_limit else _SPEED_WEIGHT
         off_deg_s = abs(end.speed_deg_s - self.end.speed_deg_s) + _UNFINISHED_SHARE * ahead_deg_s
-        return (
-            (end.angle_deg - self.end.angle_deg) ** 2
-            + (_MIDDLE_WEIGHT * (middle.angle_deg - self.middle.angle_deg)) ** 2
-            + (speed_weight * self.duration_s * off_deg_s) ** 2
-        )
+        return (end.angle_deg - self.end.angle_deg) ** 2 + (speed_weight * self.duration_s * off_deg_s) ** 2
+
+    def error_of_middle(self, middle: ReferenceState) -> float:
+        """Return the squared error, in deg^2, of a reference in the middle."""
+        return (_MIDDLE_WEIGHT * (middle.angle_deg - self.middle.angle_deg)) ** 2
 
 
 class Choice(NamedTuple):
@@ -93,11 +94,12 @@ def closest_command(before: Before, step: Step, grid: Grid, run_on_deg: float) -
         run_on_deg: how far the table may run on when the line dies.
     """
     best, least = None, math.inf
+    before = cache(before)  # most candidates share their moments
     candidates = [] if step.stands else [_ramps(before, step, grid, run_on_deg)]
     if abs(step.end.speed_deg_s) <= STANDING_DEG_S:
         candidates.append(_stops(before(step.earliest_s), step, grid))
     for choice in chain.from_iterable(candidates):
-        error = _error_of(choice, before, step)
+        error = _error_of(choice, before, step, least)
         if error < least:
             best, least = choice, error
     assert best is not None
@@ -130,7 +132,8 @@ def going_on(speed_deg_s: float, rate_deg_s2: float) -> MotionCommand:
     return MotionCommand(math.copysign(math.inf, speed_deg_s), abs(speed_deg_s), rate_deg_s2)
 
 
-def _error_of(choice: Choice, before: Before, step: Step) -> float:
+def _error_of(choice: Choice, before: Before, step: Step, least: float) -> float:
+    """Return the error of a choice, or a part of it that is not below `least` already."""
     turning = before(choice.time_s)
 
     def state_at(time_s: float) -> ReferenceState:
@@ -141,8 +144,8 @@ def _error_of(choice: Choice, before: Before, step: Step) -> float:
     target_deg, speed, rate = choice.command
     end = state_at(step.end_s)
     ahead_deg_s = abs(math.copysign(speed, target_deg) - end.speed_deg_s) if math.isinf(target_deg) else 0.0
-    error = step.error(state_at(0.5 * (step.begin_s + step.end_s)), end, ahead_deg_s)
-    return error + (_BRAKING_WEIGHT * 0.5 * speed**2 / rate) ** 2
+    error = step.error_of_end(end, ahead_deg_s) + (_BRAKING_WEIGHT * 0.5 * speed**2 / rate) ** 2
+    return error if error >= least else error + step.error_of_middle(state_at(0.5 * (step.begin_s + step.end_s)))
 
 
 def _ramps(before: Before, step: Step, grid: Grid, run_on_deg: float) -> Iterator[Choice]:

@@ -7,10 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from emulator.config.table_config import TableConfig, load_config
-from emulator.faults.fault import fault_from
+from emulator.faults import fault_from
 from emulator.table import fast_ticks
 from emulator.table.fast_ticks import FastTicks
 from emulator.table.table import Table
+from emulator.table.tick import TableConstants, TableState
 
 COMPILED = FastTicks(warm_up_ticks=0)
 CONFIGS = [load_config().with_serial(baud=baud, decimals=3) for baud in (0, 300, 9600, 115_200, 4_000_000)]
@@ -179,3 +180,30 @@ def test_a_numba_that_cannot_keep_its_code_is_done_without(monkeypatch: pytest.M
     run = FastTicks(warm_up_ticks=0)
     moving_table(run).advance(2000)
     assert not run.is_compiled
+
+
+class Interrupting(FastTicks):
+    """A run into which Ctrl-C breaks once, when its ticks have passed."""
+
+    is_armed = True
+
+    def __call__(
+        self, constants: TableConstants, state: TableState, load_torque_Nm: float, ticks: int
+    ) -> tuple[TableState, bool]:
+        """Pass the ticks, and break off at the first call."""
+        passed = super().__call__(constants, state, load_torque_Nm, ticks)
+        if self.is_armed:
+            self.is_armed = False
+            raise KeyboardInterrupt
+        return passed
+
+
+@pytest.mark.parametrize("warm_up_ticks", [0, sys.maxsize], ids=["compiled", "interpreted"])
+def test_ctrl_c_leaves_a_table_that_makes_up_for_the_ticks_it_broke_off(warm_up_ticks: int) -> None:
+    broken, sound = (Table(CONFIGS[0], run=run) for run in (Interrupting(warm_up_ticks), FastTicks(warm_up_ticks)))
+    for table in (broken, sound):
+        table.receive(b"P 30\r")
+        table.advance(700)
+    with pytest.raises(KeyboardInterrupt):
+        broken.status()
+    assert broken.status() == sound.status()
