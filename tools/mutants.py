@@ -22,8 +22,8 @@ from tools.mutation import COMPILED, MODULES, Mutation, mutations_of, planted
 from tools.progress import Progress
 
 EXPLAINED = Path(__file__).with_name("mutants.toml")
-_CPU_S = 120
-"""Of computing time, of which a whole run takes about 5 s: a mutant that takes so long hangs."""
+_CPU_S = 60
+"""Of computing time, of which a whole run takes about 15 s: a mutant that takes so long hangs."""
 
 
 class Explanation(NamedTuple):

@@ -78,13 +78,14 @@ def planted(mutation: Mutation) -> None:
     mutated.__file__ = original.__file__
     code = next(_compiled(tree, original) for one, tree in _mutated(mutation.module) if one == mutation)
     exec(code, vars(mutated))  # noqa: S102 - the project's own code
+    before = dict(vars(original))  # the module itself is changed too
     replaced = {id(value): vars(mutated)[name] for name, value in _own(original)}
     for name, user in list(sys.modules.items()):
         if name.startswith("emulator"):
             for key, value in list(vars(user).items()):
                 if id(value) in replaced:
                     setattr(user, key, replaced[id(value)])
-                elif key.isupper() and key in vars(original) and value == vars(original)[key]:
+                elif key.isupper() and key in before and value == before[key]:
                     setattr(user, key, vars(mutated)[key])
 
 
