@@ -29,6 +29,10 @@ class Watch(Protocol):
         """Return by how much the machine has been late at most since `restart`."""
         ...
 
+    def lap_s(self) -> float:
+        """Return by how much the machine has been late at most since the last call."""
+        ...
+
     def wait_for_calm(self, allowed_s: float, patience_s: float) -> None:
         """Return when the machine has not been later than `allowed_s` for a while, or when patience ends."""
         ...
@@ -44,6 +48,10 @@ class Punctual:
         """Return 0."""
         return 0.0
 
+    def lap_s(self) -> float:
+        """Return 0."""
+        return 0.0
+
     def wait_for_calm(self, allowed_s: float, patience_s: float) -> None:
         """Return at once."""
 
@@ -55,7 +63,7 @@ class HostWatch:
     """
 
     def __init__(self) -> None:
-        self._worst_s = 0.0
+        self._worst_s = self._worst_of_lap_s = 0.0
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="host watch", daemon=True)
 
@@ -79,6 +87,11 @@ class HostWatch:
         """Return by how much the machine has been late at most since `restart`, with the beat that is under way."""
         return max(self._worst_s, time.monotonic() - self._due_s)
 
+    def lap_s(self) -> float:
+        """Return by how much the machine has been late at most since the last call, with the beat under way."""
+        worst_s, self._worst_of_lap_s = self._worst_of_lap_s, 0.0
+        return max(worst_s, time.monotonic() - self._due_s)
+
     def wait_for_calm(self, allowed_s: float, patience_s: float) -> None:
         """Return when the machine has not been later than `allowed_s` for a second, or when patience ends."""
         deadline_s = time.monotonic() + patience_s
@@ -98,6 +111,7 @@ class HostWatch:
             os.read(self._receiver, 1)
             back_s = time.monotonic()
             self._worst_s = max(self._worst_s, back_s - self._due_s)
+            self._worst_of_lap_s = max(self._worst_of_lap_s, back_s - self._due_s)
             self._due_s = back_s + _PERIOD_S
 
 

@@ -1,6 +1,6 @@
 """Chapter 2: the serial line."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import cycle, islice
 
 from protocol.conformance.bench.ports import is_simulated
@@ -17,8 +17,8 @@ _TRAIN = 8
 _REPLIES, _TIMED_S = 510, 15.0
 """Replies that are timed, as far as a slow line has so much time: one late reply of 500 is among them."""
 
-_FORGIVEN, _PASSES = 1, 3
-"""The late replies that are left to a real tester's machine; with more, all is timed again: the table's come again."""
+_PASSES = 5
+"""How often all is timed again when a reply is late: one that a tester's machine spoiled does not come again."""
 
 
 @case("2.1/1", PACING)
@@ -51,7 +51,7 @@ def a_reply_begins_soon(rig: Rig) -> None:
         sent_s = rig.wire.send(line + b"\r")
         return rig.reply_to(line).first_s - sent_s - (len(line) + 2) * rig.profile.byte_s
 
-    _measure_longest(rig, "wait for a reply", lambda: [delay_s(line) for line in _lines_to_time(rig, lines, _REPLIES)])
+    _measure_longest(rig, "wait for a reply", delay_s, _lines_to_time(rig, lines, _REPLIES))
 
 
 @case("2.2/2", travel_deg=20)
@@ -76,9 +76,7 @@ def the_bytes_of_a_reply_come_without_gaps(rig: Rig) -> None:
     def idle_s(line: bytes) -> float:
         return max(rig.ask(line).gap_s - rig.profile.byte_s, 0.0)
 
-    _measure_longest(
-        rig, "gap in a reply", lambda: [idle_s(line) for line in _lines_to_time(rig, lines, _REPLIES // 3)]
-    )
+    _measure_longest(rig, "gap in a reply", idle_s, _lines_to_time(rig, lines, _REPLIES // 3))
 
 
 @case("2.3/1")
@@ -125,23 +123,35 @@ def _every_kind(rig: Rig) -> tuple[bytes, ...]:
     return (b"H", b"L", *settings, b"P %d" % (home + 1), b"H", b"R 0.5", b"L", b"P %d" % home, b"R 0", *refused)
 
 
-def _lines_to_time(rig: Rig, lines: Sequence[bytes], count: int) -> Iterable[bytes]:
+def _lines_to_time(rig: Rig, lines: Sequence[bytes], count: int) -> list[bytes]:
     """Return so many lines, by turns, or as many as a slow line has the time for."""
-    return islice(cycle(lines), max(len(lines), min(count, int(_TIMED_S / rig.reading_s))))
+    return list(islice(cycle(lines), max(len(lines), min(count, int(_TIMED_S / rig.reading_s)))))
 
 
-def _measure_longest(rig: Rig, name: str, measured: Callable[[], list[float]]) -> None:
-    """Measure the longest time; on a real line it may be the tester's own machine that is late once."""
+def _measure_longest(rig: Rig, name: str, time_of: Callable[[bytes], float], lines: Sequence[bytes]) -> None:
+    """Measure the longest time of lines; on a real line all are timed again while one is late."""
     allowed_s = 0.01 + rig.profile.serial.latency_s
-    forgiven = 0 if is_simulated(rig.wire.port.inner) else _FORGIVEN
-    for _ in range(_PASSES):
-        times_s = sorted(measured())
-        if times_s[-1 - forgiven] <= allowed_s:
-            break
-    but_for = f", but for {forgiven}" if forgiven else ""
-    rig.measure(
-        f"longest {name} of {len(times_s)}{but_for}", 1000 * times_s[-1 - forgiven], "ms", most=1000 * allowed_s
-    )
+    longest_s: list[float] = []
+    while not longest_s or (min(longest_s) > allowed_s and len(longest_s) < _passes(rig)):
+        longest_s.append(max(_times_on_a_punctual_machine(rig, time_of, lines)))
+    rig.measure(f"longest {name} of {len(lines)}", 1000 * min(longest_s), "ms", most=1000 * allowed_s)
+
+
+def _passes(rig: Rig) -> int:
+    return 1 if is_simulated(rig.wire.port.inner) else _PASSES
+
+
+def _times_on_a_punctual_machine(
+    rig: Rig, time_of: Callable[[bytes], float], lines: Sequence[bytes]
+) -> Iterator[float]:
+    """Yield the times of lines; where the tester's machine was late meanwhile, once more, and then as it is."""
+    for line in lines:
+        for _ in range(2):
+            rig.watch.lap_s()
+            time_s = time_of(line)
+            if rig.watch.lap_s() <= rig.profile.serial.latency_s:
+                break
+        yield time_s
 
 
 def _bits_a_byte(rig: Rig) -> float:

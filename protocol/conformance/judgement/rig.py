@@ -6,6 +6,7 @@ from decimal import Decimal
 from math import ceil, sqrt
 from random import Random
 
+from protocol.conformance.bench.host_watch import Punctual, Watch
 from protocol.conformance.bench.stand import Stand, StandError
 from protocol.conformance.bench.wire import CR, Line, Wire
 from protocol.conformance.judgement.reference import Instant, MotionRecord, Reference, Sample
@@ -35,10 +36,14 @@ class Rig(WireChecks):
         top_deg_s: S, as it was set last.
         rate_deg_s2: A, as it was set last.
         chance: the seeded source of what a case leaves to chance.
+        watch: how late the tester's machine is.
     """
 
-    def __init__(self, wire: Wire, profile: Profile, stand: Stand, home_deg: int, chance: Random) -> None:
+    def __init__(
+        self, wire: Wire, profile: Profile, stand: Stand, home_deg: int, chance: Random, watch: Watch | None = None
+    ) -> None:
         super().__init__(wire, profile)
+        self.watch = watch or Punctual()
         self.stand = stand
         self.home_deg = home_deg
         self.chance = chance

@@ -186,7 +186,7 @@ class Session:
 
     def _rig(self, purpose: str) -> Rig:
         chance = Random(f"{self._seed} {purpose}")  # noqa: S311  # no secret
-        return Rig(self._wire, self.profile, self._stand, self.home_deg, chance)
+        return Rig(self._wire, self.profile, self._stand, self.home_deg, chance, self._watch)
 
     def _judged(self, case: Case, rig: Rig) -> tuple[Verdict, str]:
         """Return verdict and reason of a case, with the table stopped and its line empty where it failed."""

@@ -8,6 +8,7 @@ from emulator.faults import fault_from
 from emulator.protocol_emulator import Serial
 from protocol.conformance.bench.stand import InProcess
 from protocol.conformance.bench.wire import RecordedPort
+from protocol.conformance.cases import serial_line
 from protocol.conformance.cases.case import Case
 from protocol.conformance.cases.catalogue import chosen_cases
 from protocol.conformance.judgement.rig import Rig
@@ -15,7 +16,7 @@ from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import load_profile
 from protocol.conformance.session.suite import Outcome, Session
 from protocol.messages import ErrorCode
-from tests.protocol.conformance.mutants import Mutant, port_to
+from tests.protocol.conformance.mutants import MUTANTS, Mutant, port_to
 
 
 class BusyMachine:
@@ -30,6 +31,9 @@ class BusyMachine:
 
     def late_s(self) -> float:
         return 1.3 if self._runs_left >= 0 else 0.0
+
+    def lap_s(self) -> float:
+        return 0.0
 
     def wait_for_calm(self, allowed_s: float, patience_s: float) -> None:
         assert 0.0 < allowed_s < patience_s
@@ -133,3 +137,59 @@ def test_a_machine_that_is_late_at_the_first_question_asks_it_again() -> None:
     session = Session(RecordedPort(port), load_profile(), InProcess(port.table), watch=watch)
 
     assert session.home_deg == 20
+
+
+def outcome_in_real_time(
+    kind: type[Mutant], monkeypatch: pytest.MonkeyPatch, watch: BusyMachine | None = None
+) -> Outcome:
+    """Run the case that times replies as on a real line."""
+    monkeypatch.setattr(serial_line, "is_simulated", lambda _: False)
+    port = port_to(kind)
+    session = Session(RecordedPort(port), load_profile(), InProcess(port.table), watch=watch)
+    return session.run_case(*chosen_cases(["2.2/1$"]))
+
+
+class LateOnce(Mutant):
+    """one reply comes 30 ms late"""
+
+    count = 0
+
+    def _answer(self, line: bytes | ErrorCode) -> bytes:
+        reply = super()._answer(line)
+        self.count += 1
+        if self.count == 300:
+            self.inject(fault_from("late-reply", {"seconds": 0.03}))
+        return reply
+
+
+def test_a_table_that_is_late_regularly_is_found_in_real_time_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, late_at_times = MUTANTS["every 500th reply comes 30 ms late"]
+    assert outcome_in_real_time(late_at_times, monkeypatch).verdict is Verdict.FAIL
+
+
+def test_a_reply_that_is_late_once_is_left_to_the_testers_machine_in_real_time_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert outcome_in_real_time(LateOnce, monkeypatch).verdict is Verdict.PASS
+    monkeypatch.undo()
+    port = port_to(LateOnce)
+    session = Session(RecordedPort(port), load_profile(), InProcess(port.table))
+    assert session.run_case(*chosen_cases(["2.2/1$"])).verdict is Verdict.FAIL
+
+
+class LateAtTimes(BusyMachine):
+    """A machine that is late in every 50th exchange."""
+
+    def __init__(self) -> None:
+        super().__init__(late_runs=0)
+        self.laps = 0
+
+    def lap_s(self) -> float:
+        self.laps += 1
+        return 0.05 if self.laps % 100 == 0 else 0.0
+
+
+def test_what_was_timed_on_a_late_machine_is_timed_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = LateAtTimes()
+    assert outcome_in_real_time(Mutant, monkeypatch, machine).verdict is Verdict.PASS
+    assert machine.laps == 2 * (510 + 510 // 49)
