@@ -16,7 +16,7 @@ from pathlib import Path
 from random import Random
 from typing import NamedTuple
 
-from emulator.fast_ticks import LOADED_TICKS
+from emulator.table.fast_ticks import LOADED_TICKS
 from tools.command_line import ended
 from tools.mutation import COMPILED, MODULES, Mutation, mutations_of, planted
 from tools.progress import Progress

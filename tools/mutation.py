@@ -9,6 +9,8 @@ from types import CodeType, ModuleType
 from typing import NamedTuple
 
 MODULES = (
+    "emulator.int32",
+    "emulator.config.constants",
     "emulator.plant.encoder",
     "emulator.firmware.controller",
     "emulator.firmware.fixed_point",
@@ -24,7 +26,14 @@ MODULES = (
 )
 """What the firmware of the emulated table consists of; its plant is not what the suite tests."""
 
-COMPILED = ("emulator.encoder", "emulator.firmware", "emulator.fixed_point", "emulator.pid", "emulator.profiler")
+COMPILED = (
+    "emulator.int32",
+    "emulator.plant.encoder",
+    "emulator.firmware.controller",
+    "emulator.firmware.fixed_point",
+    "emulator.firmware.pid",
+    "emulator.firmware.profiler",
+)
 """Those of which numba compiles functions."""
 
 _SWAPPED: dict[type[ast.AST], type[ast.AST]] = {
