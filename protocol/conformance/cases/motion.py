@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from math import sqrt
+from statistics import median
 
 from protocol.conformance.cases.case import case
 from protocol.conformance.judgement.reference import Expectation, Sample
@@ -214,8 +215,10 @@ def _within(rig: Rig, begin_s: float, end_s: float) -> list[Sample]:
 
 
 def _certain(rig: Rig) -> list[Sample]:
-    """Return the readings whose time is known: of the others this machine, or the table, was late (2.2/1)."""
-    return [sample for sample in rig.motion.samples if sample.uncertainty_s <= rig.profile.serial.latency_s]
+    """Return the readings but for those whose time is much less known than that of most: something was late then."""
+    samples = rig.motion.samples
+    allowed_s = median(sample.uncertainty_s for sample in samples) + rig.profile.serial.latency_s
+    return [sample for sample in samples if sample.uncertainty_s <= allowed_s]
 
 
 def _slope(samples: Sequence[Sample]) -> float:
