@@ -3,6 +3,8 @@
 from typing import Final, NamedTuple, Protocol
 
 _BAD_BYTE: Final = b"\x18"  # CAN, as in clause 8.3/1 of the protocol
+_HARMLESS: Final = (b"", b"H", b"L")
+"""Lines that change nothing."""
 
 
 class Arrival(NamedTuple):
@@ -10,7 +12,7 @@ class Arrival(NamedTuple):
 
     `left_before` and `left_after` say that a client went away before or after `data` was sent: a half line that it
     left behind ends there. `is_doubtful` says that the bytes are of several clients and that nobody can tell where
-    those of one end: their lines may not be carried out.
+    those of one end: none of their lines may set or move anything.
     """
 
     left_before: bool = False
@@ -20,8 +22,8 @@ class Arrival(NamedTuple):
 
 
 def spoiled(data: bytes) -> bytes:
-    """Return bytes whose lines are not carried out: each that is not empty is refused for a bad byte."""
-    return b"\r".join(piece and _BAD_BYTE + piece for piece in data.split(b"\r"))
+    """Return bytes whose lines change nothing: each that does more than read is refused for a bad byte."""
+    return b"\r".join(line if line in _HARMLESS else _BAD_BYTE + line for line in data.split(b"\r"))
 
 
 class Port(Protocol):

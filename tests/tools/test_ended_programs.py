@@ -15,7 +15,8 @@ import pytest
 from emulator.control_client import request
 from tests.planner.run_examples import write_short_scan
 
-ROOT = Path(__file__).parents[2]
+OURS = re.compile(rf"{re.escape(str(Path(__file__).parents[2]))}/(emulator|planner|protocol|tools)/")
+"""A file of this project in a traceback."""
 SCAN = """
 [cell]
 workpiece_on_table = [0, 0, 80, 0, 0, 0]
@@ -146,8 +147,8 @@ def test_ctrl_c_as_a_program_starts_is_one_line_and_status_130(program: Sequence
             time.sleep(wait_s)
             process.send_signal(signal.SIGINT)
             _, err = process.communicate(timeout=60)
-        if process.returncode == -signal.SIGINT and str(ROOT) not in err:
-            continue  # a busy machine had not begun with the program itself
+        if process.returncode in {-signal.SIGINT, 1} and not OURS.search(err):
+            continue  # on a busy machine Python itself was still starting
         assert process.returncode in {0, 130}, (wait_s, err)
         ended += process.returncode == 130
         assert "Traceback" not in err, (wait_s, err)

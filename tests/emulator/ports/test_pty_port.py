@@ -190,9 +190,10 @@ class Overtaken(PtyPort):
         return super()._read(whole)
 
 
-def test_of_doubtful_bytes_every_line_is_refused() -> None:
-    assert spoiled(b"R 90\rH\r") == b"\x18R 90\r\x18H\r"
+def test_of_doubtful_bytes_every_line_is_refused_that_does_more_than_read() -> None:
+    assert spoiled(b"R 90\rR 1\r") == b"\x18R 90\r\x18R 1\r"
     assert spoiled(b"S 20\r\rR 9") == b"\x18S 20\r\r\x18R 9"
+    assert spoiled(b"\x18\rH\rL\r") == b"\x18\x18\rH\rL\r"  # how a client begins that finds its place
 
 
 def test_a_client_that_writes_while_another_leaves_is_not_taken_for_it(warnings: list[str], opened: Open) -> None:
