@@ -81,9 +81,12 @@ def a_line_of_full_length_is_accepted(rig: Rig) -> None:
 
 @case("3.2/2")
 def a_longer_line_is_refused(rig: Rig) -> None:
-    """Send lines of 33, of 257 (which a byte counts as 1) and of 500 bytes, and 33 spaces."""
+    """Send lines of 33, of 257 (which a byte counts as 1) and of 500 bytes, 33 spaces, and a line in two pieces."""
     for line in (b"H".ljust(LINE_LIMIT + 1), b"H" * 33, b"H".ljust(257), b"P".ljust(500), b" " * (LINE_LIMIT + 1)):
         rig.refused(line, ErrorCode.LINE_TOO_LONG)
+    rig.wire.send(b"H".ljust(20))
+    rig.wire.clock.sleep_s(20 * rig.profile.byte_s + 0.02)
+    rig.refused(b"".ljust(20), ErrorCode.LINE_TOO_LONG)
     rig.read()
 
 

@@ -87,6 +87,14 @@ class CountsInAByte(Mutant):
         super().receive(re.sub(rb"([^\r])[^\r]{256}\r", rb"\1\r", data))
 
 
+@caught_by("3.2/2")
+class CountsEachPieceAlone(Mutant):
+    """the length of a line is that of its longest piece"""
+
+    def receive(self, data: bytes) -> None:
+        super().receive(data if len(data) > 32 else data.replace(b" ", b""))
+
+
 @caught_by("3.2/3")
 class EditsItsLine(Mutant):
     """a backspace takes the byte before it back, for terminals"""
