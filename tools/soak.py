@@ -19,6 +19,7 @@ from emulator.table.fast_ticks import FastTicks
 from emulator.table.table import Table
 from protocol.client import TableClient
 from protocol.codec import decode_reply
+from protocol.errors import TableError
 from protocol.messages import Angle, Ok, Refusal
 from tools.command_line import ended
 
@@ -116,10 +117,14 @@ def soak_clients(count: float, seed: int) -> Soak:
     with tempfile.TemporaryDirectory() as folder, _stand_in(Path(folder) / "table") as (link, process):
         descriptors = _descriptors(process)
         for index in range(round(count)):
-            with TableClient.open(link, timeout_s=2.0) as client:
-                position = client.position_deg()
-                if position != 0.0:
-                    faults.append(f"client {index} read {position} deg")
+            try:
+                with TableClient.open(link, timeout_s=2.0) as client:
+                    position = client.position_deg()
+            except TableError as error:
+                faults.append(f"client {index}: {error}")
+                continue
+            if position != 0.0:
+                faults.append(f"client {index} read {position} deg")
             if chance.random() < 0.5:
                 with Path(link).open("wb", buffering=0) as half:
                     half.write(chance.choice((b"R 5", b"P", b"H", b"S 1")))
