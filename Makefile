@@ -1,6 +1,7 @@
 # make demo    set up and run the main job
 # make test    set up and run the tests
 # make lint    format, lint and type checks
+# make mutants plant 200 small faults and see which of them the tests do not find (half an hour)
 
 PYTHON ?= python3
 VENV := .venv
@@ -8,7 +9,7 @@ BIN := $(VENV)/bin
 # The variable, unlike the option, also pins what builds the package.
 INSTALL := PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test lint clean
+.PHONY: demo test lint mutants clean
 
 demo: $(VENV)/demo.stamp
 	$(BIN)/python -m tools.demo --out build/demo
@@ -21,6 +22,9 @@ lint: $(VENV)/test.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+mutants: $(VENV)/test.stamp
+	$(BIN)/python -m tools.mutation_score --count 200
 
 $(VENV)/demo.stamp: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

@@ -98,6 +98,11 @@ def planted(mutation: Mutation) -> None:
                     setattr(user, key, vars(mutated)[key])
 
 
+def mutated_source(mutation: Mutation) -> str:
+    """Return the source of a module with a mutation in it, without its comments."""
+    return next(ast.unparse(tree) for one, tree in _mutated(mutation.module) if one == mutation)
+
+
 def _own(module: ModuleType) -> Iterator[tuple[str, object]]:
     """Yield the functions and classes that a module defines itself."""
     for name, value in vars(module).items():
