@@ -14,6 +14,7 @@ import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException, SerialTimeoutException
 
 from emulator.config.table_config import TableConfig, load_config
+from emulator.config.toml_section import ConfigError
 from emulator.line.framing import rates_agree, read_at_rate
 from emulator.table.fast_ticks import FastTicks
 from emulator.table.table import Table
@@ -273,6 +274,8 @@ def _table_of(url: str) -> Table:
     try:
         table = Table(_config_of(options), seed=int(options.get("seed", "0")), run=RUN)
         table.trigger_hz = float(options.get("trigger_hz", "0"))
+    except ConfigError as error:
+        raise SerialException(f"{url}: {error}") from error
     except ValueError as error:
         raise SerialException(f"{url}: {error}; the form is {_URL}") from error
     return table

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emulator.config.table_config import GainsConfig, GainSetsConfig, TableConfig
-from emulator.firmware.fixed_point import POSITION_BITS, SPEED_BITS, to_fixed
+from emulator.firmware.fixed_point import to_fixed
 from emulator.firmware.profiler import Profile
 from emulator.plant.drive_train import at_standstill
 from emulator.table.batch import COLUMNS, MOVE_BY, MOVE_TO, run
@@ -64,14 +64,14 @@ def switched_on(config: TableConfig, seed: int) -> tuple[TableConstants, TableSt
 
 def motion_rows(config: TableConfig, motions: list[Motion]) -> NDArray[np.int64]:
     """Return motions as `emulator.table.batch` takes them."""
-    count_deg, tick_hz = config.counts_per_turn / 360.0, config.control.tick_hz
+    count_deg, tick_hz, bits = config.counts_per_deg, config.control.tick_hz, config.motion_bits
     rows = [
         (
             round(motion.time_s * tick_hz),
             MOVE_BY if motion.by else MOVE_TO,
-            to_fixed(motion.angle_deg * count_deg, POSITION_BITS),
-            to_fixed(motion.speed_deg_s * count_deg / tick_hz, SPEED_BITS),
-            to_fixed(motion.acceleration_deg_s2 * count_deg / tick_hz**2, SPEED_BITS),
+            to_fixed(motion.angle_deg * count_deg, bits),
+            to_fixed(motion.speed_deg_s * count_deg / tick_hz, bits),
+            to_fixed(motion.acceleration_deg_s2 * count_deg / tick_hz**2, bits),
         )
         for motion in motions
     ]
@@ -88,14 +88,14 @@ def emulate(
     ticks = round(duration_s * tick_hz)
     _, samples = run(constants, state, ticks, motion_rows(config, motions), load_rows)
     column = {name: samples[:, index] for index, name in enumerate(COLUMNS)}
-    count_deg = config.counts_per_turn / 360.0
+    count_deg = config.counts_per_deg
     window = config.control.speed_window_ticks
     return Answer(
         time_s=np.arange(1, ticks + 1) / tick_hz,
         reference_deg=column["reference_count"] / count_deg,
         encoder_deg=column["encoder_count"] / count_deg,
         true_deg=np.degrees(column["table_angle_rad"]),
-        reference_speed_deg_s=column["reference_speed"] / 2.0**SPEED_BITS * tick_hz / count_deg,
+        reference_speed_deg_s=column["reference_speed"] / 2.0**config.motion_bits * tick_hz / count_deg,
         measured_deg_s=column["measured"] / window * tick_hz / count_deg,
         motor_speed_deg_s=np.degrees(column["motor_speed_rad_s"]) / config.gears.ratio,
         true_speed_deg_s=np.degrees(column["table_speed_rad_s"]),

@@ -98,7 +98,7 @@ def _soak_motions(hours: float, seed: int, pauses_ticks: Sequence[int]) -> Soak:
         if commands % 100 == 0:
             sizes_kB.append(_memory_kB())
     # The encoder's own step, and where the shaft stood between two of them, come on top of the gap.
-    allowed_deg = 2 * half_gap_deg + 2 / config.counts_per_turn * 360
+    allowed_deg = 2 * half_gap_deg + 2 / config.counts_per_deg
     growth_kB = sizes_kB[-1] - sizes_kB[len(sizes_kB) // 4] if sizes_kB else 0  # after the first quarter
     figures = {
         "simulated": f"{table.tick / _TICK_HZ / 3600:.1f} h",
@@ -137,7 +137,7 @@ def soak_clients(count: float, seed: int) -> Soak:
 def soak_wrap(count: float, seed: int) -> Soak:
     """Let the counter run over its end in motion, both ways, again and again: the motion goes on."""
     config = load_config().with_serial(baud=0)
-    table, counts_per_deg = Table(config, seed), config.counts_per_turn / 360.0
+    table, counts_per_deg = Table(config, seed), config.counts_per_deg
     faults = []
     for index in range(round(count)):
         direction = 1 if index % 2 == 0 else -1

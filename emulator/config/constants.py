@@ -3,7 +3,7 @@
 from emulator.config.table_config import GainsConfig, TableConfig
 from emulator.config.toml_section import ConfigError
 from emulator.firmware.controller import Firmware
-from emulator.firmware.fixed_point import SPEED_BITS, gain_registers, to_fixed
+from emulator.firmware.fixed_point import gain_registers, to_fixed
 from emulator.firmware.pid import Gains, Pid
 from emulator.plant.drive_train import DriveTrain, Gears
 from emulator.plant.encoder import Encoder
@@ -44,14 +44,16 @@ def firmware_constants(config: TableConfig) -> Firmware:
         ConfigError: A gain does not fit its register, or the integral gain rounds to nothing.
     """
     tick_hz = config.control.tick_hz
-    settling, protection, gains = config.settling, config.protection, config.gains
+    settling, protection, gains, bits = config.settling, config.protection, config.gains, config.motion_bits
+    approach_deg_s = min(settling.approach_speed_deg_s, config.limits.speed_deg_s)
     return Firmware(
         pid=Pid(fixed_gains(config, gains.ramp), fixed_gains(config, gains.hold), config.driver.duty_max),
+        motion_bits=bits,
         window_ticks=config.control.speed_window_ticks,
         arrival_count=settling.arrival_count,
         arrival_ticks=max(1, round(settling.arrival_time_s * tick_hz)),
-        approach_rate=to_fixed(settling.approach_rate_1_s / tick_hz, SPEED_BITS),
-        approach_speed=to_fixed(settling.approach_speed_deg_s * config.counts_per_turn / 360.0 / tick_hz, SPEED_BITS),
+        approach_rate=to_fixed(settling.approach_rate_1_s / tick_hz, bits),
+        approach_speed=to_fixed(approach_deg_s * float(config.counts_per_turn) / 360.0 / tick_hz, bits),
         stall_duty=round(protection.stall_duty * config.driver.duty_max),
         stall_ticks=max(1, round(protection.stall_time_s * tick_hz)),
         settling_ticks=max(1, round(protection.settling_time_s * tick_hz)),

@@ -4,16 +4,24 @@ The numbers themselves, and where each comes from, are in `default.toml`.
 """
 
 from dataclasses import dataclass, fields, replace
+from fractions import Fraction
+from functools import cached_property
+from math import ceil, inf
 from pathlib import Path
 from typing import Any, Self
 
+from emulator.config.gear_ratio import simplest_fraction
 from emulator.config.toml_section import ConfigError, merged, quantity, section
 from emulator.faults.fault import Fault, FaultError, fault_from
 from emulator.faults.parameter import brief
-from emulator.firmware.fixed_point import SPEED_BITS, gain_registers
+from emulator.firmware.fixed_point import ERROR_BITS, ERROR_MAX, gain_registers, motion_bits
+from emulator.int32 import INT32_MAX
 from protocol.data_file import DataFileError, read_toml
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
+
+_FINER = "a higher encoder.lines or gears.ratio, a lower control.tick_hz or a lower limit"
+_COARSER = "a lower encoder.lines or gears.ratio, a higher control.tick_hz or a shorter control.speed_window_ticks"
 
 
 @dataclass(frozen=True)
@@ -43,7 +51,7 @@ class DriverConfig:
 class GearsConfig:
     """The spur gear chain between motor and table."""
 
-    ratio: float = quantity(least=1, most=1e5)
+    ratio: float = quantity(least=1, most=1e5, fraction=True)
     efficiency: float = quantity(least=0.01, most=1)
     inertia_kg_m2: float = quantity(least=0, most=10)
     backlash_arcmin: float = quantity(least=0, most=600)
@@ -79,7 +87,7 @@ class ControlConfig:
     """The firmware's clock and speed estimate."""
 
     tick_hz: int = quantity(least=100, most=100_000)
-    speed_window_ticks: int = quantity(least=1, most=64)
+    speed_window_ticks: int = quantity(least=1, most=256)
 
 
 @dataclass(frozen=True)
@@ -154,15 +162,33 @@ class TableConfig:
     serial: SerialConfig
     faults: tuple[Fault, ...] = ()  # [[faults]] of a file; none are shipped
 
-    @property
-    def counts_per_turn(self) -> float:
-        """Encoder counts in one turn of the table: quadrature counts each line four times."""
-        return 4 * self.encoder.lines * self.gears.ratio
+    @cached_property
+    def counts_per_turn(self) -> Fraction:
+        """Encoder counts in one turn of the table, exactly: quadrature counts each line four times."""
+        return 4 * self.encoder.lines * simplest_fraction(self.gears.ratio)
+
+    @cached_property
+    def counts_per_deg(self) -> float:
+        """Encoder counts in one degree of the table."""
+        return float(self.counts_per_turn) / 360.0
+
+    @cached_property
+    def motion_bits(self) -> int:
+        """Fraction bits of position, speed and acceleration in the firmware, see `fixed_point`."""
+        return motion_bits(*self._counts_per_tick(self.limits))
+
+    def _counts_per_tick(self, motion: MotionConfig) -> tuple[Fraction, Fraction]:
+        """Return a speed in count/tick and an acceleration in count/tick^2."""
+        tick_hz, count_deg = self.control.tick_hz, self.counts_per_turn / 360
+        return (
+            Fraction(motion.speed_deg_s) * count_deg / tick_hz,
+            Fraction(motion.acceleration_deg_s2) * count_deg / tick_hz**2,
+        )
 
     def gains_per_tick(self, gains: GainsConfig) -> tuple[float, float, float]:
         """Return K, K / Ti and K Td as one tick applies them: PWM steps for a speed error of one count a window."""
         tick_s = 1.0 / self.control.tick_hz
-        error_unit_deg_s = 360.0 / self.counts_per_turn / (self.control.speed_window_ticks * tick_s)
+        error_unit_deg_s = 360.0 / float(self.counts_per_turn) / (self.control.speed_window_ticks * tick_s)
         gain = gains.proportional_duty_s_deg * self.driver.duty_max * error_unit_deg_s
         return gain, gain * tick_s / gains.integral_time_s, gain * gains.derivative_time_s / tick_s
 
@@ -218,32 +244,46 @@ def _check_together(config: TableConfig, source: str) -> None:
         start, limit = getattr(config.power_on, name), getattr(config.limits, name)
         if start > limit:
             raise ConfigError(f"{source}: power_on.{name} is {start:g}; it must be at most limits.{name}, {limit:g}")
-    if not config.counts_per_turn.is_integer():
-        raise ConfigError(
-            f"{source}: gears.ratio is {config.gears.ratio!r}; with encoder.lines {config.encoder.lines} "
-            "it must give a whole number of counts a turn"
-        )
+    _check_turn(config, source)
     _check_registers(config, source)
+
+
+def _check_turn(config: TableConfig, source: str) -> None:
+    """Refuse a turn that is not a fraction of two integers of 32 bits, in counts."""
+    lines, counts = config.encoder.lines, config.counts_per_turn
+    if counts > INT32_MAX:
+        raise ConfigError(
+            f"{source}: a turn is {float(counts):.3g} counts; it must be at most {INT32_MAX}: "
+            "lower encoder.lines or gears.ratio"
+        )
+    if max(counts.numerator, counts.denominator) > INT32_MAX:
+        most = INT32_MAX // (4 * lines * ceil(config.gears.ratio))
+        nearest = simplest_fraction(config.gears.ratio).limit_denominator(max(1, most))
+        raise ConfigError(
+            f"{source}: gears.ratio is {config.gears.ratio!r}; with encoder.lines {lines} a turn is {counts} counts, "
+            f'a fraction of more than 32 bits; the nearest ratio that fits is "{nearest}"'
+        )
 
 
 def _check_registers(config: TableConfig, source: str) -> None:
     """Refuse what does not fit the firmware's number formats; see `fixed_point`."""
-    count_deg, tick_hz = config.counts_per_turn / 360.0, config.control.tick_hz
-    unit = 2.0**-SPEED_BITS
-    # A speed register ends at 32 counts a tick, and the sum of a speed and an acceleration must fit too.
-    speeds_deg_s = (unit * tick_hz / count_deg, 31.0 * tick_hz / count_deg)
-    accelerations_deg_s2 = (unit * tick_hz**2 / count_deg, tick_hz**2 / count_deg)
+    count_deg, tick_hz, window = config.counts_per_deg, config.control.tick_hz, config.control.speed_window_ticks
+    unit, most_counts = 2.0**-config.motion_bits, float(ERROR_MAX >> ERROR_BITS)
+    speeds_deg_s = (unit * tick_hz / count_deg, most_counts / window * tick_hz / count_deg)
+    accelerations_deg_s2 = (unit * tick_hz**2 / count_deg, most_counts / 2 * tick_hz**2 / count_deg)
     held = (
         ("limits.speed_deg_s", config.limits.speed_deg_s, speeds_deg_s),
         ("limits.acceleration_deg_s2", config.limits.acceleration_deg_s2, accelerations_deg_s2),
         ("power_on.speed_deg_s", config.power_on.speed_deg_s, speeds_deg_s),
         ("power_on.acceleration_deg_s2", config.power_on.acceleration_deg_s2, accelerations_deg_s2),
-        ("settling.approach_speed_deg_s", config.settling.approach_speed_deg_s, speeds_deg_s),
+        ("settling.approach_speed_deg_s", config.settling.approach_speed_deg_s, (speeds_deg_s[0], inf)),
     )
     for name, value, (least, most) in held:
         if not least <= value <= most:
+            bound, remedy = (f"at least {least:g}", _FINER) if value < least else (f"at most {most:g}", _COARSER)
             raise ConfigError(
-                f"{source}: {name} is {value:g}; with this encoder and tick the firmware holds {least:g} to {most:g}"
+                f"{source}: {name} is {value:g}; with this encoder, gear ratio and tick the firmware holds {bound}; "
+                f"{remedy} extends its range"
             )
     for name in ("ramp", "hold"):
         gains = getattr(config.gains, name)

@@ -7,6 +7,7 @@ import math
 from dataclasses import field, fields, is_dataclass
 from typing import Any, get_type_hints
 
+from emulator.config.gear_ratio import ratio_in
 from emulator.faults.parameter import brief
 from protocol.data_file import did_you_mean
 
@@ -15,9 +16,11 @@ class ConfigError(ValueError):
     """A configuration that cannot be used; the message names the file, the key and what is allowed."""
 
 
-def quantity(*, above: float | None = None, least: float | None = None, most: float | None = None) -> Any:  # noqa: ANN401  # stands for a value of the annotated type
-    """Declare a number that must be > `above`, >= `least` and <= `most`."""
-    return field(metadata={"above": above, "least": least, "most": most})
+def quantity(
+    *, above: float | None = None, least: float | None = None, most: float | None = None, fraction: bool = False
+) -> Any:  # noqa: ANN401  # stands for a value of the annotated type
+    """Declare a number that must be > `above`, >= `least` and <= `most`; `fraction` allows a text such as "7/3"."""
+    return field(metadata={"above": above, "least": least, "most": most, "fraction": fraction})
 
 
 def merged(defaults: dict[str, Any], changes: dict[str, Any], source: str, where: str = "") -> dict[str, Any]:
@@ -72,6 +75,13 @@ def _number(wanted: type, value: object, limits: Any, where: str) -> float | int
         if wanted is bool and isinstance(value, bool):
             return value
         raise ConfigError(f"{where} is {brief(value)}; it must be {'true or false' if wanted is bool else 'a number'}")
+    if limits["fraction"] and isinstance(value, str):
+        try:
+            value = ratio_in(value)
+        except ValueError:
+            raise ConfigError(
+                f'{where} is {brief(value)}; it must be a number, or a fraction of integers such as "2197/27"'
+            ) from None
     if not isinstance(value, int if wanted is int else (int, float)):
         raise ConfigError(f"{where} is {brief(value)}; it must be a {'whole number' if wanted is int else 'number'}")
     if isinstance(value, float) and not math.isfinite(value):

@@ -10,7 +10,7 @@ A motion runs through these states:
 
 from typing import NamedTuple
 
-from emulator.firmware.fixed_point import ERROR_BITS, POSITION_BITS, SPEED_BITS, clamp
+from emulator.firmware.fixed_point import ERROR_BITS, clamp
 from emulator.firmware.pid import HOLD, RAMP, Pid, PidState, switched_off
 from emulator.firmware.pid import step as pid_step
 from emulator.firmware.profiler import Profile, Reference, at_rest, retarget, standing_at
@@ -25,18 +25,17 @@ DRIVE_OFF = (IDLE, STALLED)
 
 STATE_NAMES = ("idle", "moving", "settling", "stalled")
 
-_DEMAND_SHIFT = SPEED_BITS - ERROR_BITS
-
 
 class Firmware(NamedTuple):
     """The controller's constants, in its own formats."""
 
     pid: Pid
+    motion_bits: int  # fraction bits of position, speed and acceleration
     window_ticks: int  # over which the speed is measured
     arrival_count: int  # this near is at the target
     arrival_ticks: int  # once it has been there for so long
-    approach_rate: int  # of speed over remaining distance, per tick; 26 fraction bits
-    approach_speed: int  # count/tick, 26 fraction bits
+    approach_rate: int  # of speed over remaining distance, per tick; `motion_bits`
+    approach_speed: int  # count/tick, `motion_bits`
     stall_duty: int  # PWM steps; a motor driven so hard must turn
     stall_ticks: int  # within this time
     settling_ticks: int  # the longest that settling may take
@@ -69,37 +68,37 @@ def power_on(parameters: Firmware, profile: Profile, count: int) -> FirmwareStat
     )
 
 
-def begin_motion(state: FirmwareState, profile: Profile, distance: int) -> FirmwareState:
-    """Return the controller with a new target, `distance` (26 fraction bits) from the reference.
+def begin_motion(state: FirmwareState, profile: Profile, distance: int, bits: int) -> FirmwareState:
+    """Return the controller with a new target, `distance` (`bits` fraction bits) from the reference.
 
     The reference goes on from its present position and speed; that of a table that stalled is where it stands.
     """
-    return FirmwareState(MOVING, profile, retarget(state.reference, distance), state.counts, state.pid, 0, 0, 0)
+    return FirmwareState(MOVING, profile, retarget(state.reference, distance, bits), state.counts, state.pid, 0, 0, 0)
 
 
-def distance_to(reference: Reference, target: int) -> int:
-    """Return the way to an absolute position; both with 26 fraction bits, neither modulo a turn."""
-    return target - (reference.position_count << POSITION_BITS) - reference.fraction
+def distance_to(reference: Reference, target: int, bits: int) -> int:
+    """Return the way to an absolute position; both with `bits` fraction bits, neither modulo a turn."""
+    return target - (reference.position_count << bits) - reference.fraction
 
 
 def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareState:
     """Return the controller after one tick, at the end of which the encoder's counter reads `count`."""
     motion, profile, reference, counts, regulator, still_ticks, settling_ticks, arrived_ticks = state
     measured = wrap_int32(count - counts[0])
-    last_count = counts[-1]
+    last_count, bits = counts[-1], parameters.motion_bits
     counts = (*counts[1:], count)
     if motion in DRIVE_OFF:
         return _drive_off(motion, profile, reference, counts, switched_off(regulator, measured))
 
     if motion == MOVING:
         last_speed = reference.speed
-        reference = profiler_step(profile, reference)
+        reference = profiler_step(profile, reference, bits)
         demand = reference.speed
         gain_set = HOLD if reference.speed == last_speed else RAMP
         if at_rest(reference):
             motion = SETTLING
     else:
-        remaining = position_error(reference, count)
+        remaining = position_error(reference, count, bits)
         arrived_ticks = arrived_ticks + 1 if abs(remaining) <= parameters.arrival_count else 0
         if arrived_ticks >= parameters.arrival_ticks:
             return _drive_off(IDLE, profile, reference, counts, switched_off(regulator, measured))
@@ -107,7 +106,7 @@ def step(parameters: Firmware, state: FirmwareState, count: int) -> FirmwareStat
         gain_set = HOLD
         settling_ticks += 1
 
-    window_demand = (demand * parameters.window_ticks) >> _DEMAND_SHIFT
+    window_demand = (demand * parameters.window_ticks) >> (bits - ERROR_BITS)
     regulator = pid_step(parameters.pid, regulator, gain_set, window_demand, measured)
     still = count == last_count and abs(regulator.duty) >= parameters.stall_duty
     still_ticks = still_ticks + 1 if still else 0
@@ -122,6 +121,6 @@ def _drive_off(
     return FirmwareState(motion, profile, reference, counts, regulator, 0, 0, 0)
 
 
-def position_error(reference: Reference, count: int) -> int:
+def position_error(reference: Reference, count: int, bits: int) -> int:
     """Return how far the encoder is from the reference position, in whole counts."""
-    return wrap_int32(reference.position_count + (reference.fraction >> (POSITION_BITS - 1)) - count)
+    return wrap_int32(reference.position_count + (reference.fraction >> (bits - 1)) - count)

@@ -5,28 +5,46 @@ right round towards minus infinity, as an arithmetic shift does on the controlle
 
 | quantity | unit | fraction bits | register |
 |---|---|---|---|
-| position | encoder count | 0, and a second word of 26 | 32 + 26 |
-| distance | encoder count | 0, and a second word of 26 | 38 + 26: braking may lead far away from the target |
-| speed | count/tick | 26 | 32, so less than 32 counts a tick |
-| acceleration | count/tick^2 | 26 | 32 |
-| speed error | count/window | 8 | 32 |
+| position | encoder count | 0, and a second word of M | 32 + M |
+| distance | encoder count | 0, and a second word of M | 64 - M, and M: braking may lead far away from the target |
+| speed | count/tick | M | 32 |
+| acceleration | count/tick^2 | M | 32 |
+| speed error | count/window | 8 | 32, so less than 2^21 counts a window |
 | proportional and derivative gain | PWM step/(count/window) | 12 | 32 |
 | integral gain | PWM step/(count/window) a tick | 16 | 32 |
 | integral, controller output | PWM step | 20 | 32 |
+
+M, the motion's fraction bits, is a constant of the table (`motion_bits`): 26 for the default one.
 """
 
 from fractions import Fraction
 
 from emulator.int32 import INT32_MAX
 
-POSITION_BITS = 26
-SPEED_BITS = 26
 ERROR_BITS = 8
 GAIN_BITS = 12
 INTEGRAL_GAIN_BITS = 16
 OUTPUT_BITS = ERROR_BITS + GAIN_BITS
 
-POSITION_MASK = (1 << POSITION_BITS) - 1
+ERROR_MAX = (1 << 29) - 1
+"""Four products of it with a gain fit 64 bits."""
+
+FEWEST_MOTION_BITS = 9
+MOST_MOTION_BITS = 30
+"""With more, an absolute target at the far end of the counter would be further away than 64 bits hold."""
+
+
+def motion_bits(speed: Fraction, acceleration: Fraction) -> int:
+    """Return as many fraction bits as the sum of the greatest speed and acceleration leaves in 32 bits, within limits.
+
+    Args:
+        speed: the greatest, count/tick.
+        acceleration: the greatest, count/tick^2.
+    """
+    bits = MOST_MOTION_BITS
+    while bits > FEWEST_MOTION_BITS and to_fixed(speed, bits) + to_fixed(acceleration, bits) > INT32_MAX:
+        bits -= 1
+    return bits
 
 
 def clamp(number: int, bound: int) -> int:
@@ -56,7 +74,8 @@ def gain_registers(proportional: float, integral: float, derivative: float) -> t
     )
     if max(registers) > INT32_MAX or registers[1] < 1:
         raise OverflowError(
-            f"its registers would hold {registers}; each must be at most {INT32_MAX}, the integral gain at least 1"
+            f"its registers would hold {registers}; each must be at most {INT32_MAX}, the integral gain at least 1; "
+            "a finer encoder or a longer speed window lowers them"
         )
     return registers
 

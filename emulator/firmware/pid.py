@@ -8,15 +8,13 @@ see `fixed_point`.
 
 from typing import NamedTuple
 
-from emulator.firmware.fixed_point import ERROR_BITS, INTEGRAL_GAIN_BITS, OUTPUT_BITS, clamp
+from emulator.firmware.fixed_point import ERROR_BITS, ERROR_MAX, INTEGRAL_GAIN_BITS, OUTPUT_BITS, clamp
 
 RAMP = 0
 HOLD = 1
 
 _HALF = 1 << (OUTPUT_BITS - 1)
 _INTEGRAL_SHIFT = ERROR_BITS + INTEGRAL_GAIN_BITS - OUTPUT_BITS
-_ERROR_MAX = (1 << 21) - 1
-"""Beyond any speed of the table; it keeps the product with the greatest gain within 64 bits."""
 
 
 class Gains(NamedTuple):
@@ -60,8 +58,8 @@ def step(parameters: Pid, state: PidState, gain_set: int, demand: int, measured:
         measured: Measured speed, count/window.
     """
     gains = parameters.ramp if gain_set == RAMP else parameters.hold
-    error = clamp(demand - (measured << ERROR_BITS), _ERROR_MAX)
-    change = (measured - state.measured) << ERROR_BITS
+    error = clamp(demand - (measured << ERROR_BITS), ERROR_MAX)
+    change = clamp((measured - state.measured) << ERROR_BITS, ERROR_MAX)
     direct = gains.proportional * error - gains.derivative * change
     integral = state.integral
     if gain_set != state.gain_set:

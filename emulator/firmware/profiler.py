@@ -2,21 +2,21 @@
 
 The profile is not planned ahead. At each tick the reference takes the greatest speed that the acceleration, the top
 speed and the distance left to brake allow, so a new target, speed or acceleration may come at any time: the reference
-goes on from where it is, at the speed that it has (Fig. 4). All numbers are integers; see `fixed_point`.
+goes on from where it is, at the speed that it has (Fig. 4). All numbers are integers; `bits` are
+their fraction bits, see `fixed_point`.
 """
 
 from typing import NamedTuple
 
-from emulator.firmware.fixed_point import POSITION_BITS, POSITION_MASK
 from emulator.int32 import wrap_int32
 
 
 class Profile(NamedTuple):
     """What one motion must keep."""
 
-    speed: int  # the greatest, count/tick, 26 fraction bits
-    acceleration: int  # count/tick^2, 26 fraction bits
-    far: int  # count, 26 fraction bits; see `far_distance`
+    speed: int  # the greatest, count/tick
+    acceleration: int  # count/tick^2
+    far: int  # count; see `far_distance`
 
     @classmethod
     def of(cls, speed: int, acceleration: int) -> "Profile":
@@ -30,11 +30,11 @@ def far_distance(acceleration: int) -> int:
 
 
 class Reference(NamedTuple):
-    """Where the profile is, and its way to the target; both are words of whole counts and of 26 fraction bits."""
+    """Where the profile is, and its way to the target; both are a word of whole counts and a word of the fraction."""
 
     position_count: int
     fraction: int
-    speed: int  # count/tick, 26 fraction bits
+    speed: int  # count/tick
     distance_count: int
     distance_fraction: int
 
@@ -49,21 +49,21 @@ def at_rest(reference: Reference) -> bool:
     return reference.speed == 0 and reference.distance_count == 0 and reference.distance_fraction == 0
 
 
-def retarget(reference: Reference, distance: int) -> Reference:
-    """Return the reference with a new target, `distance` (26 fraction bits) away; position and speed go on."""
+def retarget(reference: Reference, distance: int, bits: int) -> Reference:
+    """Return the reference with a new target, `distance` away; position and speed go on."""
     return Reference(
         reference.position_count,
         reference.fraction,
         reference.speed,
-        distance >> POSITION_BITS,
-        distance & POSITION_MASK,
+        distance >> bits,
+        distance & ((1 << bits) - 1),
     )
 
 
-def step(profile: Profile, reference: Reference) -> Reference:
+def step(profile: Profile, reference: Reference, bits: int) -> Reference:
     """Return the reference one tick later."""
     position_count, fraction, speed, distance_count, distance_fraction = reference
-    distance = (distance_count << POSITION_BITS) + distance_fraction
+    distance = (distance_count << bits) + distance_fraction
     if distance > 0 or (distance == 0 and speed < 0):
         speed, advance = _towards(profile, speed, distance)
     else:
@@ -71,12 +71,13 @@ def step(profile: Profile, reference: Reference) -> Reference:
         speed, advance = -speed, -advance
     fraction += advance
     distance -= advance
+    mask = (1 << bits) - 1
     return Reference(
-        wrap_int32(position_count + (fraction >> POSITION_BITS)),
-        fraction & POSITION_MASK,
+        wrap_int32(position_count + (fraction >> bits)),
+        fraction & mask,
         speed,
-        distance >> POSITION_BITS,
-        distance & POSITION_MASK,
+        distance >> bits,
+        distance & mask,
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from emulator.firmware import fixed_point, profiler
+from emulator.firmware import profiler
 from emulator.firmware.controller import begin_motion, distance_to
 from emulator.firmware.profiler import Profile
 from emulator.plant.drive_train import DriveState
@@ -22,7 +22,7 @@ MOVE_BY: Final = 1
 
 COLUMNS: Final = (
     "reference_count",
-    "reference_speed",  # 26 fraction bits, count/tick
+    "reference_speed",  # count/tick, the table's motion bits
     "encoder_count",
     "measured",  # count/window
     "motor_speed_rad_s",
@@ -36,8 +36,8 @@ COLUMNS: Final = (
 )
 
 Motions = NDArray[np.int64]
-"""(n, 5): tick, MOVE_TO or MOVE_BY, angle, speed, acceleration; the last three with 26 fraction bits, as the firmware
-holds them. In the order of their ticks."""
+"""(n, 5): tick, MOVE_TO or MOVE_BY, angle, speed, acceleration; the last three with the table's motion bits, as the
+firmware holds them. In the order of their ticks."""
 
 Loads = NDArray[np.float64]
 """(n, 2): tick, and the load torque in Nm from then on. In the order of their ticks."""
@@ -75,27 +75,27 @@ def advance(
             load_torque_Nm = loads[next_load, 1]
             next_load += 1
         while next_motion < len(motions) and motions[next_motion, 0] <= now:
-            state = _command(state, motions, next_motion)
+            state = _command(state, motions, next_motion, constants.firmware.motion_bits)
             next_motion += 1
         state = step(constants, state, load_torque_Nm)
         if (now + 1) % every == 0:
-            _sample(samples, (now + 1) // every - 1, state)
+            _sample(samples, (now + 1) // every - 1, state, constants.firmware.motion_bits)
     return state
 
 
-def _command(state: TableState, motions: Motions, row: int) -> TableState:
+def _command(state: TableState, motions: Motions, row: int, bits: int) -> TableState:
     distance = motions[row, 2]
     if motions[row, 1] == MOVE_TO:
-        distance = distance_to(state.firmware.reference, distance)
+        distance = distance_to(state.firmware.reference, distance, bits)
     profile = Profile(motions[row, 3], motions[row, 4], profiler.far_distance(motions[row, 4]))
-    return TableState(state.drive, begin_motion(state.firmware, profile, distance), state.duty)
+    return TableState(state.drive, begin_motion(state.firmware, profile, distance, bits), state.duty)
 
 
-def _sample(samples: NDArray[np.float64], row: int, state: TableState) -> None:
+def _sample(samples: NDArray[np.float64], row: int, state: TableState, bits: int) -> None:
     drive: DriveState = state.drive
     controller = state.firmware
     reference = controller.reference
-    samples[row, 0] = reference.position_count + reference.fraction / (1 << fixed_point.POSITION_BITS)
+    samples[row, 0] = reference.position_count + reference.fraction / (1 << bits)
     samples[row, 1] = reference.speed
     samples[row, 2] = controller.counts[-1]
     samples[row, 3] = controller.pid.measured

@@ -6,21 +6,17 @@ from typing import NamedTuple
 
 from emulator.config.table_config import TableConfig
 from emulator.firmware.controller import FirmwareState, begin_motion, distance_to
-from emulator.firmware.fixed_point import POSITION_BITS, SPEED_BITS, to_fixed
+from emulator.firmware.fixed_point import to_fixed
 from emulator.firmware.profiler import Profile
 from emulator.int32 import INT32_MAX
 from protocol.messages import Angle, Command, ErrorCode, Ok, Refusal, Reply, Verb
-
-_LAST_POSITION = INT32_MAX << POSITION_BITS
-_HALF_RANGE = (INT32_MAX + 1) << POSITION_BITS
-"""The longest motion; and, below 0, the first position."""
 
 
 class Registers(NamedTuple):
     """What waits for the next motion command, and the latch."""
 
-    speed: int  # count/tick, 26 fraction bits
-    acceleration: int  # count/tick^2, 26 fraction bits
+    speed: int  # count/tick, the table's motion bits
+    acceleration: int  # count/tick^2, the table's motion bits
     latched_count: int
 
 
@@ -31,7 +27,10 @@ class Interpreter:
         """Take the units and limits of a configured table."""
         self._limits = config.limits
         self._power_on = config.power_on
-        self._count_deg = Fraction(config.counts_per_turn) / 360
+        self._count_deg = config.counts_per_turn / 360
+        self._bits = config.motion_bits
+        self._last_position = INT32_MAX << self._bits
+        self._half_range = (INT32_MAX + 1) << self._bits  # the longest motion; and, below 0, the first position
         self._tick_hz = config.control.tick_hz
 
     def power_on(self) -> Registers:
@@ -80,18 +79,18 @@ class Interpreter:
     def _move(
         self, verb: Verb, value: Fraction, controller: FirmwareState, registers: Registers
     ) -> tuple[Reply, FirmwareState, Registers]:
-        distance = target = to_fixed(value * self._count_deg, POSITION_BITS)
+        distance = target = to_fixed(value * self._count_deg, self._bits)
         if verb is Verb.MOVE_TO:
-            distance = distance_to(controller.reference, target)
-            if not -_HALF_RANGE <= target <= _LAST_POSITION:
+            distance = distance_to(controller.reference, target, self._bits)
+            if not -self._half_range <= target <= self._last_position:
                 return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
-        if abs(distance) > _HALF_RANGE:
+        if abs(distance) > self._half_range:
             return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
         profile = Profile.of(registers.speed, registers.acceleration)
-        return Ok(), begin_motion(controller, profile, distance), registers
+        return Ok(), begin_motion(controller, profile, distance, self._bits), registers
 
     def _speed(self, speed_deg_s: Fraction) -> int:
-        return to_fixed(speed_deg_s * self._count_deg / self._tick_hz, SPEED_BITS)
+        return to_fixed(speed_deg_s * self._count_deg / self._tick_hz, self._bits)
 
     def _acceleration(self, acceleration_deg_s2: Fraction) -> int:
-        return to_fixed(acceleration_deg_s2 * self._count_deg / self._tick_hz**2, SPEED_BITS)
+        return to_fixed(acceleration_deg_s2 * self._count_deg / self._tick_hz**2, self._bits)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from emulator.config.table_config import TableConfig
 from emulator.firmware.controller import STATE_NAMES
-from emulator.firmware.fixed_point import POSITION_BITS, SPEED_BITS, from_fixed
+from emulator.firmware.fixed_point import from_fixed
 from emulator.firmware.pid import RAMP
 from emulator.line.uart import Uart
 from emulator.plant.encoder import Encoder
@@ -49,14 +49,14 @@ def table_status(
     """Return what plant, controller and line say; the true angle counts from `true_zero_rad`."""
     drive, controller, _ = state
     reference, regulator = controller.reference, controller.pid
-    count_deg = config.counts_per_turn / 360.0
+    count_deg = config.counts_per_deg
     speed_deg_s = config.control.tick_hz / count_deg  # of one count a tick
     return TableStatus(
         tick=tick,
-        reference_deg=(reference.position_count + from_fixed(reference.fraction, POSITION_BITS)) / count_deg,
+        reference_deg=(reference.position_count + from_fixed(reference.fraction, config.motion_bits)) / count_deg,
         encoder_deg=controller.counts[-1] / count_deg,
         true_deg=math.degrees(drive.table_angle_rad - true_zero_rad),
-        reference_speed_deg_s=from_fixed(reference.speed, SPEED_BITS) * speed_deg_s,
+        reference_speed_deg_s=from_fixed(reference.speed, config.motion_bits) * speed_deg_s,
         speed_deg_s=regulator.measured / config.control.speed_window_ticks * speed_deg_s,
         true_speed_deg_s=math.degrees(drive.table_speed_rad_s),
         current_A=drive.current_A,

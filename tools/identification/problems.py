@@ -102,7 +102,7 @@ def _wire_problem(config: TableConfig, recording: WireRecording) -> Problem:
 
 def _intervals(config: TableConfig, recording: WireRecording, seen_deg: Array) -> Intervals:
     """Return what replies tell: a reply is a rounded count, so the encoder stood between two counts."""
-    count_deg, half = config.counts_per_turn / 360.0, recording.resolution_deg / 2.0
+    count_deg, half = config.counts_per_deg, recording.resolution_deg / 2.0
     low = np.ceil((seen_deg - half) * count_deg - 1e-6) / count_deg
     high = (np.floor((seen_deg + half) * count_deg + 1e-6) + 1.0) / count_deg
     return Intervals(low, high)
@@ -131,7 +131,7 @@ def _drive_problem(config: TableConfig, recording: DriveRecording) -> Problem:
     duty, position_deg = ticks_of(recording, tick_hz)
     window = max(1, round(_DRIVE_WINDOW_S * tick_hz))
     seen_deg = np.diff(position_deg[::window])
-    count_deg = 360.0 / config.counts_per_turn
+    count_deg = 1.0 / config.counts_per_deg
 
     def predict(vector: Array) -> Array:
         *logarithms, delay_ticks = vector

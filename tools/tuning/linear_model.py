@@ -94,7 +94,7 @@ def duty_gains(config: TableConfig, gains: Gains | Array) -> Array:
 
 def speed_quantum_deg_s(config: TableConfig) -> float:
     """Return the speed of one count a window."""
-    return 360.0 / config.counts_per_turn * config.control.tick_hz / config.control.speed_window_ticks
+    return 1.0 / config.counts_per_deg * config.control.tick_hz / config.control.speed_window_ticks
 
 
 def regulator(config: TableConfig, gains: Gains) -> control.StateSpace:
@@ -126,7 +126,7 @@ def quantisation_noise(config: TableConfig) -> tuple[float, float]:
 
     Rounding to a step is taken as white noise, uniform over the step: step / sqrt(12).
     """
-    return 360.0 / config.counts_per_turn / sqrt(12.0), 1.0 / config.driver.duty_max / sqrt(12.0)
+    return 1.0 / config.counts_per_deg / sqrt(12.0), 1.0 / config.driver.duty_max / sqrt(12.0)
 
 
 def moving_friction_Nm(config: TableConfig) -> float:

@@ -101,7 +101,7 @@ class InProcess:
     @property
     def counts_per_deg(self) -> float:
         """Counts of the table's own registers to the degree."""
-        return float(self._table.config.counts_per_turn) / 360.0
+        return float(self._table.config.counts_per_deg)
 
     def trigger(self) -> None:
         """Put one edge on the trigger input, now."""

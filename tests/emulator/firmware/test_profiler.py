@@ -10,11 +10,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
-from emulator.firmware.fixed_point import POSITION_BITS
 from emulator.firmware.profiler import Profile, Reference, at_rest, retarget, step
 from emulator.int32 import INT32_MAX
 
-ONE = 1 << POSITION_BITS
+BITS = 26  # of the default table
+ONE = 1 << BITS
 TICK_S = 0.001
 DEG = ONE * 512  # one degree, with 26 fraction bits, on the default table
 DEG_S = DEG * TICK_S
@@ -28,11 +28,11 @@ start_speeds = st.integers(-SPEED_LIMIT, SPEED_LIMIT)
 
 
 def position(reference: Reference) -> int:
-    return (reference.position_count << POSITION_BITS) + reference.fraction
+    return (reference.position_count << BITS) + reference.fraction
 
 
 def distance_left(reference: Reference) -> int:
-    return (reference.distance_count << POSITION_BITS) + reference.distance_fraction
+    return (reference.distance_count << BITS) + reference.distance_fraction
 
 
 def run_to_rest(profile: Profile, reference: Reference, ticks: int) -> Iterator[Reference]:
@@ -41,7 +41,7 @@ def run_to_rest(profile: Profile, reference: Reference, ticks: int) -> Iterator[
     for _ in range(ticks):
         if at_rest(reference):
             return
-        reference = step(profile, reference)
+        reference = step(profile, reference, BITS)
         yield reference
     assert at_rest(reference), f"still on its way after {ticks} ticks: {reference}"
 
@@ -80,12 +80,12 @@ def test_pre_empted_motions_are_those_that_ruckig_plans(seed: int) -> None:
     for _ in range(500):
         profile, distance = random_motion(chance)
         start = position(reference)
-        reference = retarget(reference, distance)
+        reference = retarget(reference, distance, BITS)
         planned = ruckig_trajectory(reference.speed / DEG_S, profile, distance / DEG)
         ticks = 1 + int(chance.uniform(0.0, 1.1) * min(planned.duration / TICK_S, 2000.0))
         looks = {chance.randint(1, ticks) for _ in range(8)}
         for tick in range(1, ticks + 1):
-            reference = step(profile, reference)
+            reference = step(profile, reference, BITS)
             if tick in looks:
                 position_deg, speed_deg_s, _ = planned.at_time(min(tick * TICK_S, planned.duration))
                 assert abs(reference.speed - speed_deg_s[0] * DEG_S) < profile.acceleration / 2 + 2
@@ -97,9 +97,9 @@ def test_pre_empted_motions_are_those_that_ruckig_plans(seed: int) -> None:
 def test_speed_changes_by_at_most_the_acceleration_and_keeps_to_the_top_speed(
     speed: int, acceleration: int, start_speed: int, distance: int
 ) -> None:
-    profile, reference = Profile.of(speed, acceleration), retarget(Reference(0, 0, start_speed, 0, 0), distance)
+    profile, reference = Profile.of(speed, acceleration), retarget(Reference(0, 0, start_speed, 0, 0), distance, BITS)
     for _ in range(300):
-        before, reference = reference.speed, step(profile, reference)
+        before, reference = reference.speed, step(profile, reference, BITS)
         assert abs(reference.speed - before) <= acceleration
         assert abs(reference.speed) <= max(speed, abs(before) - acceleration)
 
@@ -118,9 +118,9 @@ def test_every_motion_ends_at_rest_exactly_on_its_target(
     profile = Profile.of(speed, max(1, speed // ramp_ticks))
     start = Reference(0, 0, max(-speed, min(speed, start_ticks * profile.acceleration)), 0, 0)
     distance = travel_ticks * speed + offset
-    *_, last = run_to_rest(profile, retarget(start, distance), 4000 + 4 * speed // profile.acceleration)
+    *_, last = run_to_rest(profile, retarget(start, distance, BITS), 4000 + 4 * speed // profile.acceleration)
     assert position(last) == distance
-    assert last == Reference(distance >> POSITION_BITS, distance % ONE, 0, 0, 0)
+    assert last == Reference(distance >> BITS, distance % ONE, 0, 0, 0)
 
 
 @settings(max_examples=200, deadline=None)
@@ -129,7 +129,7 @@ def test_every_motion_ends_at_rest_exactly_on_its_target(
 @example(speed=1, acceleration=8, distance=-1)
 def test_the_smallest_registers_still_arrive(speed: int, acceleration: int, distance: int) -> None:
     """A unit is 2^-26 counts a tick: the truncation of the arithmetic is as large as the motion."""
-    profile, start = Profile.of(speed, acceleration), retarget(STANDING, distance)
+    profile, start = Profile.of(speed, acceleration), retarget(STANDING, distance, BITS)
     for reference in run_to_rest(profile, start, 2000):
         assert abs(reference.speed) <= speed
         assert 0 <= distance_left(reference) * (1 if distance > 0 else -1) <= abs(distance)
@@ -141,9 +141,9 @@ def test_no_overshoot_where_there_is_room_to_brake(speed: int, acceleration: int
     profile = Profile.of(speed, acceleration)
     start_speed = int(min(speed, 500 * acceleration) * share)
     braking = -(-start_speed * (start_speed + acceleration) // (2 * acceleration))  # the mean tick's way included
-    reference = retarget(Reference(0, 0, start_speed, 0, 0), braking + spare)
+    reference = retarget(Reference(0, 0, start_speed, 0, 0), braking + spare, BITS)
     for _ in range(1500):
-        reference = step(profile, reference)
+        reference = step(profile, reference, BITS)
         assert distance_left(reference) >= 0
         assert reference.speed >= 0
 
@@ -153,7 +153,7 @@ def test_a_target_too_near_is_passed_by_the_braking_distance_alone(target: int) 
     """At 40 deg/s and 100 deg/s2 the table needs 8 degrees; a target within them is come back to."""
     profile = Profile.of(round(40 * DEG_S), round(100 * DEG_S2))
     start = Reference(0, 0, profile.speed, 0, 0)
-    farthest = max(position(reference) for reference in run_to_rest(profile, retarget(start, target), 5000))
+    farthest = max(position(reference) for reference in run_to_rest(profile, retarget(start, target, BITS), 5000))
     assert farthest == pytest.approx(max(8 * DEG, target), abs=profile.acceleration)
 
 
@@ -163,17 +163,17 @@ def test_backwards_is_the_mirror_image_of_forwards(
     speed: int, acceleration: int, start_speed: int, distance: int
 ) -> None:
     profile = Profile.of(speed, acceleration)
-    forwards = retarget(Reference(0, 0, start_speed, 0, 0), distance)
-    backwards = retarget(Reference(0, 0, -start_speed, 0, 0), -distance)
+    forwards = retarget(Reference(0, 0, start_speed, 0, 0), distance, BITS)
+    backwards = retarget(Reference(0, 0, -start_speed, 0, 0), -distance, BITS)
     for _ in range(50):
-        forwards, backwards = step(profile, forwards), step(profile, backwards)
+        forwards, backwards = step(profile, forwards, BITS), step(profile, backwards, BITS)
         assert (forwards.speed, distance_left(forwards)) == (-backwards.speed, -distance_left(backwards))
         assert position(forwards) == -position(backwards)
 
 
 def test_the_counter_wraps_and_the_motion_goes_on() -> None:
     profile = Profile.of(round(40 * DEG_S), round(100 * DEG_S2))
-    start = retarget(Reference(INT32_MAX - 100, 0, 0, 0, 0), 1000 * ONE)
+    start = retarget(Reference(INT32_MAX - 100, 0, 0, 0, 0), 1000 * ONE, BITS)
     *_, last = run_to_rest(profile, start, 5000)
     assert last == Reference(-(2**31) + 899, 0, 0, 0, 0)
 
@@ -220,8 +220,7 @@ extremes = st.sampled_from([1, 2, 7, ONE >> 10, ONE >> 5, ONE - 1, ONE])
     speed=st.sampled_from([1, 1000, SPEED_LIMIT // 2, SPEED_LIMIT]),
     acceleration=extremes,
     start_speed=st.sampled_from([-SPEED_LIMIT, -1, 0, 1, SPEED_LIMIT]) | start_speeds,
-    distance=st.sampled_from([1, ONE, (INT32_MAX + 1) << POSITION_BITS])
-    | st.integers(0, (INT32_MAX + 1) << POSITION_BITS),
+    distance=st.sampled_from([1, ONE, (INT32_MAX + 1) << BITS]) | st.integers(0, (INT32_MAX + 1) << BITS),
     near_braking=st.booleans(),
 )
 def test_no_intermediate_result_exceeds_64_bits(
@@ -231,10 +230,10 @@ def test_no_intermediate_result_exceeds_64_bits(
     if near_braking:
         distance = start_speed * start_speed // (2 * acceleration)
     profile = Profile(*map(Register, Profile.of(speed, acceleration)))
-    start = retarget(Reference(0, 0, start_speed, 0, 0), distance)
+    start = retarget(Reference(0, 0, start_speed, 0, 0), distance, BITS)
     reference = Reference(*map(Register, start))
     for _ in range(5):
-        reference = step(profile, reference)
+        reference = step(profile, reference, BITS)
         assert abs(reference.speed) <= INT32_MAX
         assert -INT32_MAX - 1 <= reference.position_count <= INT32_MAX
         assert 0 <= reference.fraction < ONE

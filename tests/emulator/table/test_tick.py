@@ -18,7 +18,8 @@ def table_in_motion() -> tuple[TableConstants, TableState]:
     """Return a table that is told to turn by 100 counts, at 10 deg/s and 20 deg/s2."""
     constants, state = table_at_rest()
     profile = Profile.of(round(5.12 * COUNT), round(0.01024 * COUNT))
-    return constants, state._replace(firmware=begin_motion(state.firmware, profile, 100 * COUNT))
+    bits = constants.firmware.motion_bits
+    return constants, state._replace(firmware=begin_motion(state.firmware, profile, 100 * COUNT, bits))
 
 
 def test_a_table_wakes_at_rest_where_it_stands() -> None:

@@ -3,7 +3,6 @@
 from decimal import Decimal
 from math import isqrt
 
-from emulator.firmware.fixed_point import POSITION_BITS
 from protocol.messages import Command, Verb
 from tests.protocol.conformance.mutants.mutant import MOTIONS, Line, Mutant, Rereads, caught_by, value_of
 
@@ -56,7 +55,7 @@ class NoTriangles(Scales):
     def scaled(self, command: Command) -> tuple[int, int]:
         speed, acceleration, _ = self._registers
         way = abs(value_of(command) - (self.target() if command.verb is Verb.MOVE_TO else 0))
-        peak = isqrt(acceleration * int(way * 512) << POSITION_BITS)
+        peak = isqrt(acceleration * int(way * 512) << self.bits)
         return max(1, min(speed, peak * 3 // 4)), acceleration
 
 

@@ -5,7 +5,6 @@ from decimal import Decimal
 
 from emulator.config.table_config import TableConfig, load_config
 from emulator.firmware.controller import MOVING, SETTLING
-from emulator.firmware.fixed_point import POSITION_BITS
 from emulator.firmware.profiler import Profile
 from emulator.protocol_emulator import Serial
 from emulator.table.table import Table
@@ -42,18 +41,23 @@ class Mutant(Table):
     def moving(self) -> bool:
         return self._state.firmware.motion in {MOVING, SETTLING}
 
+    @property
+    def bits(self) -> int:
+        """Fraction bits of position and speed."""
+        return self.config.motion_bits
+
     def position(self) -> Decimal:
         return self._interpreter.angle_deg(self._state.firmware.counts[-1])
 
     def target(self) -> Decimal:
         reference = self._state.firmware.reference
-        fixed = (reference.position_count + reference.distance_count << POSITION_BITS) + reference.fraction
-        return Decimal(fixed + reference.distance_fraction) / (1 << POSITION_BITS) / 512
+        fixed = (reference.position_count + reference.distance_count << self.bits) + reference.fraction
+        return Decimal(fixed + reference.distance_fraction) / (1 << self.bits) / 512
 
     def braking_way(self) -> Decimal:
         """How far the reference still goes when it brakes now with the acceleration of its motion."""
         speed, acceleration = self._state.firmware.reference.speed, self._state.firmware.profile.acceleration
-        return Decimal(speed * abs(speed) // (2 * acceleration)) / (1 << POSITION_BITS) / 512
+        return Decimal(speed * abs(speed) // (2 * acceleration)) / (1 << self.bits) / 512
 
     def rerun(self, speed: int, acceleration: int) -> None:
         """Give the running motion another profile."""

@@ -1,6 +1,5 @@
 """Wrong tables: a motion that replaces another."""
 
-from emulator.firmware.fixed_point import SPEED_BITS
 from protocol.messages import Command, Verb
 from tests.protocol.conformance.mutants.mutant import MOTIONS, Line, Mutant, Rereads, caught_by, value_of, verb_of
 
@@ -176,7 +175,7 @@ class StartsFromTheMotor(Rereads):
         if self.moving:
             controller = self._state.firmware
             window_ticks = self.config.control.speed_window_ticks
-            self.start_from((controller.pid.measured << SPEED_BITS) // window_ticks)
+            self.start_from((controller.pid.measured << self.bits) // window_ticks)
         return command
 
 

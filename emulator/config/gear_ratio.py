@@ -1,0 +1,37 @@
+"""A gear ratio as the fraction of integers that its teeth make: 2197/27 or 4989/10, and never 81.37037."""
+
+import math
+import re
+from fractions import Fraction
+
+_FRACTION = re.compile(r"\s*([0-9]{1,10})\s*/\s*([0-9]{1,10})\s*")
+
+
+def ratio_in(text: str) -> float:
+    """Return the ratio that a text such as `2197/27` states.
+
+    Raises:
+        ValueError: it is not a fraction of integers, or it divides by 0.
+    """
+    parts = _FRACTION.fullmatch(text)
+    if parts is None or int(parts[2]) == 0:
+        raise ValueError(f"{text[:60]!r} is not a fraction of integers")
+    return int(parts[1]) / int(parts[2])
+
+
+def simplest_fraction(value: float) -> Fraction:
+    """Return the fraction with the smallest denominator among those to which `value` (> 0) is the nearest float.
+
+    So a float stands for the fraction that it was made of: 2197 / 27 for 2197/27, and 498.9 for 4989/10.
+    """
+    exact = Fraction(value)
+    below, above = Fraction(math.nextafter(value, 0.0)), Fraction(math.nextafter(value, math.inf))
+    return _simplest_between((below + exact) / 2, (exact + above) / 2)
+
+
+def _simplest_between(low: Fraction, high: Fraction) -> Fraction:
+    """Return the fraction with the smallest denominator from `low` to `high`, by their continued fraction."""
+    whole = math.ceil(low)
+    if whole <= high:
+        return Fraction(whole)
+    return whole - 1 + 1 / _simplest_between(1 / (high - whole + 1), 1 / (low - whole + 1))

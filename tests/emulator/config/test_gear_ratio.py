@@ -1,0 +1,36 @@
+"""A ratio as a float stands for the fraction that it was made of."""
+
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from emulator.config.gear_ratio import ratio_in, simplest_fraction
+
+teeth = st.integers(1, 60_000)
+
+
+@given(driven=teeth, driving=teeth)
+def test_a_ratio_of_teeth_survives_the_way_through_a_float(driven: int, driving: int) -> None:
+    assert simplest_fraction(ratio_in(f"{driven}/{driving}")) == Fraction(driven, driving)
+    assert simplest_fraction(driven / driving) == Fraction(driven, driving)
+
+
+@given(st.decimals(1, 100_000, places=4))
+def test_a_decimal_number_of_a_datasheet_stands_for_itself(ratio: Fraction) -> None:
+    assert simplest_fraction(float(ratio)) == Fraction(ratio)
+
+
+@given(st.floats(1e-6, 1e6))
+def test_the_fraction_is_the_simplest_of_those_whose_nearest_float_is_the_ratio(value: float) -> None:
+    simplest = simplest_fraction(value)
+    assert float(simplest) == value
+    if simplest.denominator > 1:
+        assert float(Fraction(value).limit_denominator(simplest.denominator - 1)) != value
+
+
+@pytest.mark.parametrize("text", ["", "1", "2197:27", "2197/0", "-1/2", "1/-2", "1.5/2", "1/2/3", "9" * 5000 + "/1"])
+def test_a_text_that_is_not_a_fraction_of_integers_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="not a fraction of integers"):
+        ratio_in(text)
