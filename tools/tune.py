@@ -3,10 +3,12 @@
     python -m tools.tune --out build/tune
     python -m tools.tune --config table.toml --ms 1.6 --noise 0.3 --out build/tune
 
-Writes gains.toml (for `python -m emulator --config`), gains.h, report.html and its plots.
+Writes gains.toml (for `python -m emulator --config`), gains.h, report.html and its plots. Where no gains keep all
+bounds, it writes the report and its plots, prints a command line that works, and ends with status 2.
 """
 
 import argparse
+import shlex
 import sys
 from contextlib import ExitStack
 from math import inf
@@ -37,8 +39,37 @@ def _tune(options: argparse.Namespace) -> int:
     with Progress("tuning") as progress:
         tuning = tune(config, limits, options.plants, options.spread / 100.0, options.seed, progress.show)
     _write(options.out, tuning)
+    if not tuning.feasible:
+        raise TuningError(_refusal(tuning, options))
     _print(tuning)
     return 0
+
+
+def _refusal(tuning: Tuning, options: argparse.Namespace) -> str:
+    """Return which bounds cannot be kept, and a command line that works."""
+    sets = [
+        f"the {tuned.title} breaks {', '.join(map(tuned.design.stated, tuned.design.broken))}"
+        for tuned in tuning.sets.values()
+        if tuned.design.broken
+    ]
+    way = "no command line was found that works"
+    if tuning.eased is not None:
+        way = f"this works: {_command_line(options, tuning.eased)}"
+    return f"no gains keep all bounds; of the nearest {' and '.join(sets)}; {way}"
+
+
+def _command_line(options: argparse.Namespace, limits: Limits) -> str:
+    """Return the command line with other limits."""
+    words = ["python", "-m", "tools.tune", "--out", str(options.out)]
+    if options.config is not None:
+        words += ["--config", str(options.config)]
+    for bound, usual in zip(limits.for_hold(), Limits().for_hold(), strict=True):
+        if bound != usual:
+            words += bound.option.split()
+    for name in ("plants", "spread", "seed"):
+        if (value := getattr(options, name)) != _parser().get_default(name):
+            words += [f"--{name}", f"{value:g}"]
+    return shlex.join(words)
 
 
 def _limits(options: argparse.Namespace) -> Limits:
@@ -66,15 +97,18 @@ def _limits(options: argparse.Namespace) -> Limits:
 def _write(folder: Path, tuning: Tuning) -> None:
     """Write all files, or none of them."""
     drawings = plots(tuning)
-    gains = {name: tuned.design.gains for name, tuned in tuning.sets.items()}
-    files = {"gains.toml": gains_toml(tuning.after), "gains.h": gains_header(tuning.after, gains)}
+    files = {}
+    if tuning.feasible:
+        gains = {name: tuned.design.gains for name, tuned in tuning.sets.items()}
+        files = {"gains.toml": gains_toml(tuning.after), "gains.h": gains_header(tuning.after, gains)}
     files |= {f"{name}.svg": drawing for name, drawing in drawings.items()}
     files["report.html"] = tune_report(tuning, drawings)
     folder.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
         for name, text in files.items():
             stack.enter_context(whole_file(folder / name)).write_text(text, encoding="utf-8")
-    print(f"wrote gains.toml, gains.h, report.html and plots to {folder}", file=sys.stderr)
+    written = "gains.toml, gains.h, report.html" if tuning.feasible else "report.html"
+    print(f"wrote {written} and plots to {folder}", file=sys.stderr)
 
 
 def _print(tuning: Tuning) -> None:
@@ -99,42 +133,64 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--config", type=Path, help="TOML with the table's constants that differ from the default ones")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR")
-    parser.add_argument("--ms", type=float, default=defaults.sensitivity_peak, help="the greatest Ms (%(default)s)")
+    parser.add_argument("--ms", type=float, default=defaults.sensitivity_peak, help="maximum Ms (default: %(default)s)")
     parser.add_argument(
-        "--gain-margin", type=float, default=defaults.gain_margin_db, metavar="DB", help="the least (%(default)s)"
+        "--gain-margin",
+        type=float,
+        default=defaults.gain_margin_db,
+        metavar="DB",
+        help="minimum gain margin in dB (default: %(default)s)",
     )
     parser.add_argument(
-        "--phase-margin", type=float, default=defaults.phase_margin_deg, metavar="DEG", help="the least (%(default)s)"
+        "--phase-margin",
+        type=float,
+        default=defaults.phase_margin_deg,
+        metavar="DEG",
+        help="minimum phase margin in deg (default: %(default)s)",
     )
     parser.add_argument(
         "--noise",
         type=float,
         default=100.0 * defaults.noise_duty,
         metavar="PERCENT",
-        help="the most noise at the PWM, in percent of full duty (%(default)s)",
+        help="maximum noise at the PWM at the worst constant speed, standard deviation in percent of full duty "
+        "(default: %(default)s)",
     )
     parser.add_argument(
-        "--bandwidth", type=float, default=defaults.bandwidth_hz, metavar="HZ", help="the least, -3 dB (%(default)s)"
+        "--bandwidth",
+        type=float,
+        default=defaults.bandwidth_hz,
+        metavar="HZ",
+        help="minimum bandwidth at -3 dB in Hz (default: %(default)s)",
     )
     parser.add_argument(
         "--overshoot",
         type=float,
         default=100.0 * defaults.overshoot,
         metavar="PERCENT",
-        help="the most after a step, of the constant-speed set (%(default)s)",
+        help="maximum overshoot of the constant-speed set after a step (default: %(default)s)",
     )
     parser.add_argument(
         "--settling",
         type=float,
         default=1e3 * defaults.settling_s,
         metavar="MS",
-        help="the most until a step of speed or load is settled to 10 %%, of the constant-speed set (%(default)s)",
+        help="maximum time in which the constant-speed set settles to 10 %% after a step of speed or load "
+        "(default: %(default)s)",
     )
-    parser.add_argument("--plants", type=int, default=1000, metavar="N", help="of the Monte Carlo (%(default)s)")
     parser.add_argument(
-        "--spread", type=float, default=20.0, metavar="PERCENT", help="of the plants' constants (%(default)s)"
+        "--plants", type=int, default=1000, metavar="N", help="tables in the Monte Carlo (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the Monte Carlo and the runs (%(default)s)")
+    parser.add_argument(
+        "--spread",
+        type=float,
+        default=20.0,
+        metavar="PERCENT",
+        help="spread of the constants in the Monte Carlo (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, help="random seed of Monte Carlo and runs (default: %(default)s)"
+    )
     return parser
 
 

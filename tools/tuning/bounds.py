@@ -20,6 +20,7 @@ class Bound(NamedTuple):
     at_most: bool
     scale: float  # from the figure's unit to the one that is shown
     unit: str
+    flag: str  # of the command line, in the unit that is shown
 
     def excess(self, figures: LoopFigures) -> Array:
         """Return how far the figure is beyond the limit, as a share of it; negative where the bound is kept."""
@@ -38,6 +39,11 @@ class Bound(NamedTuple):
         return float((ceil if self.at_most else floor)(eased / power) * power)
 
     @property
+    def option(self) -> str:
+        """The bound as an option of the command line."""
+        return f"{self.flag} {self.limit * self.scale:.6g}"
+
+    @property
     def asked(self) -> str:
         """The limit in words."""
         return f"{'at most' if self.at_most else 'at least'} {self.shown(self.limit)}"
@@ -53,7 +59,7 @@ class Limits(NamedTuple):
     sensitivity_peak: float = 1.7
     gain_margin_db: float = 8.0
     phase_margin_deg: float = 40.0
-    noise_duty: float = 0.004
+    noise_duty: float = 0.0062
     bandwidth_hz: float = 10.0
     overshoot: float = 0.10
     settling_s: float = 0.1
@@ -61,19 +67,19 @@ class Limits(NamedTuple):
     def for_ramp(self) -> tuple[Bound, ...]:
         """Return the bounds of the ramp set."""
         return (
-            Bound("sensitivity_peak", "Ms", self.sensitivity_peak, True, 1.0, ""),
-            Bound("gain_margin_db", "gain margin", self.gain_margin_db, False, 1.0, " dB"),
-            Bound("phase_margin_deg", "phase margin", self.phase_margin_deg, False, 1.0, " deg"),
-            Bound("noise_duty", "noise at the PWM", self.noise_duty, True, 100.0, " % duty"),
-            Bound("bandwidth_hz", "bandwidth", self.bandwidth_hz, False, 1.0, " Hz"),
+            Bound("sensitivity_peak", "Ms", self.sensitivity_peak, True, 1.0, "", "--ms"),
+            Bound("gain_margin_db", "gain margin", self.gain_margin_db, False, 1.0, " dB", "--gain-margin"),
+            Bound("phase_margin_deg", "phase margin", self.phase_margin_deg, False, 1.0, " deg", "--phase-margin"),
+            Bound("noise_duty", "noise at the PWM", self.noise_duty, True, 100.0, " % duty", "--noise"),
+            Bound("bandwidth_hz", "bandwidth", self.bandwidth_hz, False, 1.0, " Hz", "--bandwidth"),
         )
 
     def for_hold(self) -> tuple[Bound, ...]:
         """Return the bounds of the constant-speed set: those of the ramp set, and a clean step answer."""
         return (
             *self.for_ramp(),
-            Bound("overshoot", "overshoot", self.overshoot, True, 100.0, " %"),
-            Bound("settling_s", "settling", self.settling_s, True, 1e3, " ms"),
+            Bound("overshoot", "overshoot", self.overshoot, True, 100.0, " %", "--overshoot"),
+            Bound("settling_s", "settling", self.settling_s, True, 1e3, " ms", "--settling"),
         )
 
 

@@ -7,12 +7,21 @@ from typing import NamedTuple
 from emulator.config.table_config import TableConfig
 from tools.tuning.check import Check, Figure
 from tools.tuning.linear_checks import load_step, ramp, step
+from tools.tuning.noise_check import noise
 from tools.tuning.nonlinear_checks import creep, reversal, small_moves
 
 AGREES_SHARE = 0.2
 """Beyond this share of what the model foretells, a difference is explained."""
 
-_CHECKS: tuple[Callable[[TableConfig, int], Check], ...] = (ramp, step, load_step, small_moves, reversal, creep)
+_CHECKS: tuple[Callable[[TableConfig, int], Check], ...] = (
+    ramp,
+    step,
+    load_step,
+    noise,
+    small_moves,
+    reversal,
+    creep,
+)
 
 
 class Difference(NamedTuple):

@@ -6,8 +6,6 @@ decides, otherwise how little they break them; so when nothing keeps the bounds,
 """
 
 from collections.abc import Callable
-from functools import partial
-from itertools import combinations
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -46,52 +44,58 @@ class Design(NamedTuple):
         """The bounds that even the best gains break."""
         return tuple(bound for bound in self.bounds if bound.excess(self.figures)[0] > 0.0)
 
+    def stated(self, bound: Bound) -> str:
+        """Return a bound with what these gains reach, in words."""
+        return f"{bound.title} {bound.shown(float(getattr(self.figures, bound.figure)[0]))} (asked is {bound.asked})"
+
     @property
     def binding(self) -> tuple[Bound, ...]:
         """The bounds that keep the gains from being better: those that are nearly reached."""
         return tuple(bound for bound in self.bounds if bound.excess(self.figures)[0] > -_BINDING_SHARE)
 
 
-def design(loops: Loops, bounds: tuple[Bound, ...], objective: Objective) -> Design:
+class Scan(NamedTuple):
+    """The whole search box in coarse steps, judged once for all bounds and objectives."""
+
+    loops: Loops
+    points: Array
+    figures: LoopFigures
+    reach: Array  # the steps
+
+
+def scan(loops: Loops) -> Scan:
+    """Return the coarse scan of one table's loops."""
+    low, high = _search_box(loops)
+    points, reach = _grid(low, high, _COARSE)
+    return Scan(loops, points, _figures(loops, points), reach)
+
+
+def design(scanned: Scan, bounds: tuple[Bound, ...], objective: Objective) -> Design:
     """Return the gain set with the least `objective` within the bounds.
 
     Args:
-        loops: The loops of one table.
+        scanned: The coarse scan of the table's loops.
         bounds: What the gain set must keep.
         objective: What is to be least of a loop's figures, such as `LEAST_LAG` or `LEAST_LOAD_PEAK`.
     """
-    low, high = _search_box(loops)
-    best = np.zeros(3)
-    for zoom in range(_ZOOMS + 1):
-        counts = _FINE if zoom else _COARSE
-        axes = [np.linspace(start, end, count) for start, end, count in zip(low, high, counts, strict=True)]
-        points = np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=-1)
+    loops, reach = scanned.loops, scanned.reach
+    best = scanned.points[_best(scanned.figures, bounds, objective)]
+    for _ in range(_ZOOMS):
+        points, reach = _grid(best - reach, best + reach, _FINE)
         best = points[_best(_figures(loops, points), bounds, objective)]
-        reach = np.array([axis[1] - axis[0] for axis in axes])
-        low, high = best - reach, best + reach
-    gains = Gains(*(int(value) for value in _registers(loops, best[None])[0]))
+    return judged(loops, Gains(*(int(value) for value in _registers(loops, best[None])[0])), bounds)
+
+
+def judged(loops: Loops, gains: Gains, bounds: tuple[Bound, ...]) -> Design:
+    """Return a given gain set with its figures."""
     return Design(gains, loop_figures(loops, np.array([gains])), bounds)
 
 
-class Relaxation(NamedTuple):
-    """Bounds that together stand in the way, and the values that they would have to allow instead."""
-
-    bounds: tuple[Bound, ...]
-    figures: LoopFigures
-
-
-def relaxations(loops: Loops, refused: Design) -> tuple[Relaxation, ...]:
-    """Return which one of the bounds to relax, or where no one is enough, which two."""
-    for count in (1, 2):
-        found = []
-        for group in combinations(refused.binding, count):
-            others = tuple(bound for bound in refused.bounds if bound not in group)
-            best = design(loops, others, partial(violation, group))
-            if best.figures.stable[0] and not best.broken:
-                found.append(Relaxation(group, best.figures))
-        if found:
-            return tuple(found)
-    return ()
+def _grid(low: Array, high: Array, counts: tuple[int, ...]) -> tuple[Array, Array]:
+    """Return all points of a grid, and its steps."""
+    axes = [np.linspace(start, end, count) for start, end, count in zip(low, high, counts, strict=True)]
+    points = np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=-1)
+    return points, np.array([axis[1] - axis[0] for axis in axes])
 
 
 def _figures(loops: Loops, points: Array) -> LoopFigures:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from emulator.config.table_config import TableConfig
 from tools.tuning.frequency_response import Array, Complex, PlantResponse, grid_hz, grid_z, plant_response
 from tools.tuning.linear_model import Teeth, duty_gains, quantisation_noise, speed_gain_deg_s
-from tools.tuning.margins import controller, margins, noise_duty
+from tools.tuning.margins import controller, margins, noise_duty, noise_power
+from tools.tuning.speed_noise import steady_noise
 
 SETTLED_SHARE = 0.1
 
@@ -43,7 +44,9 @@ class LoopFigures(NamedTuple):
     sensitivity_peak: Array
     gain_margin_db: Array
     phase_margin_deg: Array
-    noise_duty: Array  # standard deviation of the duty, from the rounding of the position to counts
+    noise_duty: Array  # standard deviation of the duty from the rounding of the position, at the worst constant speed
+    noisy_count_tick: Array  # that speed, the part of a count a tick; so much less than a whole count is as noisy
+    ramp_noise_duty: Array  # the same standard deviation on a ramp
     bandwidth_hz: Array  # -3 dB of the speed over the reference, loaded
     overshoot: Array  # of the speed after a step of the reference, loaded; 0.1 is 10 %
     settling_s: Array  # from a step of the reference or the load until the speed stays within a tenth of it
@@ -61,10 +64,13 @@ def loop_figures(loops: Loops, registers: Array) -> LoopFigures:
         margins(regulator.by_measured * plant.measured_by_duty, loops.frequency_hz) for plant in loops.plants.values()
     ]
     count_deg, _ = quantisation_noise(config)
-    noises = [
-        noise_duty(regulator, plant, count_deg, window_ticks / tick_hz, window_ticks, z)
+    window_s, count_tick = window_ticks / tick_hz, config.limits.speed_deg_s * config.counts_per_deg / tick_hz
+    noises = [noise_duty(regulator, plant, count_deg, window_s, window_ticks, z) for plant in loops.plants.values()]
+    steady = [
+        steady_noise(noise_power(regulator, plant, window_s, window_ticks, z), count_tick)
         for plant in loops.plants.values()
     ]
+    worst = np.argmax([noise for noise, _ in steady], axis=0)[None]
     plant = loops.plants[Teeth.DRIVING]
     sensitivity = 1.0 / (1.0 + regulator.by_measured * plant.measured_by_duty)
     tracking = plant.speed_by_duty * regulator.by_reference * sensitivity
@@ -77,7 +83,9 @@ def loop_figures(loops: Loops, registers: Array) -> LoopFigures:
         sensitivity_peak=np.max([state.sensitivity_peak for state in per_state], axis=0),
         gain_margin_db=np.min([state.gain_margin_db for state in per_state], axis=0),
         phase_margin_deg=np.min([state.phase_margin_deg for state in per_state], axis=0),
-        noise_duty=np.max(noises, axis=0),
+        noise_duty=np.max([noise for noise, _ in steady], axis=0) / config.counts_per_deg,
+        noisy_count_tick=np.take_along_axis(np.array([speed for _, speed in steady]), worst, axis=0)[0],
+        ramp_noise_duty=np.max(noises, axis=0),
         bandwidth_hz=_bandwidth_hz(tracking, loops.frequency_hz),
         overshoot=np.maximum(speed.max(axis=-1) - 1.0, 0.0),
         settling_s=settling / tick_hz,

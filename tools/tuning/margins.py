@@ -13,6 +13,15 @@ from numpy.typing import NDArray
 
 from tools.tuning.frequency_response import Array, Complex, PlantResponse
 
+_PLACES = np.linspace(0.0, 4.0, 401)
+_QUARTIC = np.stack(  # Lagrange's polynomials of the points 0, 1, 2, 3, 4
+    [
+        np.prod([(_PLACES - other) / (point - other) for other in range(5) if other != point], axis=0)
+        for point in range(5)
+    ],
+    axis=-1,
+)
+
 
 class Controller(NamedTuple):
     """The regulator's responses: to the reference, and to the measured speed (the derivative acts on that alone)."""
@@ -53,11 +62,11 @@ def margins(loop: Complex, frequency_hz: Array) -> Margins:
 
 
 def _least_size(curve: Complex) -> Array:
-    """Return the least distance of a curve from the origin, taken as straight between two frequencies."""
-    start, way = curve[..., :-1], np.diff(curve, axis=-1)
-    length2 = np.abs(way) ** 2
-    share = np.clip(-(start * way.conj()).real / np.where(length2 == 0.0, 1.0, length2), 0.0, 1.0)
-    result: Array = np.abs(start + share * way).min(axis=-1)
+    """Return the least distance of a curve from the origin, on the quartic through the points about the nearest one."""
+    nearest = np.abs(curve).argmin(axis=-1)
+    first = np.clip(nearest - 2, 0, curve.shape[-1] - 5)
+    points = np.take_along_axis(curve, first[..., None] + np.arange(5), axis=-1)
+    result: Array = np.abs(points @ _QUARTIC.T).min(axis=-1)
     return result
 
 
@@ -92,17 +101,24 @@ def _crossing(a: Array, b: Array) -> Array:
     return np.clip(-a / np.where(change == 0.0, 1.0, change), 0.0, 1.0)
 
 
+def noise_power(control: Controller, plant: PlantResponse, window_s: float, window_ticks: int, z: Complex) -> Array:
+    """Return the squared response of the duty to an error of the position, which enters at both ends of the window."""
+    speed_by_position = (1.0 - z**-window_ticks) / window_s
+    result: Array = (
+        np.abs(control.by_measured / (1.0 + control.by_measured * plant.measured_by_duty) * speed_by_position) ** 2
+    )
+    return result
+
+
 def noise_duty(
     control: Controller, plant: PlantResponse, count_deg: float, window_s: float, window_ticks: int, z: Complex
 ) -> Array:
     """Return the standard deviation of the duty that the rounding of the position to counts causes.
 
-    The noise enters as the difference of two counts over the window. Parseval: the variance is the mean over all
+    The errors are taken as white, as on a ramp, which passes all speeds. Parseval: the variance is the mean over all
     frequencies of the squared response. All but the last of the grid stand for their mirror image too.
     """
-    speed_by_count = (1.0 - z**-window_ticks) / window_s
-    response = control.by_measured / (1.0 + control.by_measured * plant.measured_by_duty) * speed_by_count
-    power = np.abs(response) ** 2
+    power = noise_power(control, plant, window_s, window_ticks, z)
     variance = (power.sum(axis=-1) - 0.5 * power[..., -1]) / len(z)
     result: Array = count_deg * np.sqrt(variance)
     return result

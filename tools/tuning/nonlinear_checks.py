@@ -9,6 +9,8 @@ from tools.tuning.check import Check, Curve, Figure, far_deg, greatest_ramp
 
 _CREEP = 0.005
 """Share of the greatest speed."""
+_CREEP_S, _SETTLED_CREEP_S = 4.0, 1.0
+"""Duration of the creep after the gap, and how long the table has then moved before its ripple is measured."""
 _SMALL_MOVES_DEG = (0.1, 0.2, 0.5, 1.0, 3.0)
 _LONGEST_SETTLING_S = 10.0
 
@@ -52,11 +54,13 @@ def reversal(config: TableConfig, seed: int) -> Check:
 
 
 def creep(config: TableConfig, seed: int) -> Check:
-    """Creep, where stiction and the quantum of the speed weigh most."""
+    """Creep, where stiction and the quantum of the speed weigh most; the table moves once the gap is crossed."""
     speed = _CREEP * config.limits.speed_deg_s
-    answer = emulate(config, [Motion(0.1, far_deg(config), speed, 5.0 * speed)], 4.0, seed=seed)
-    late = answer.time_s > 2.0
-    ripple = float(answer.true_speed_deg_s[late].std())
+    crossing_s = config.gears.backlash_arcmin / 60.0 / speed
+    motions = [Motion(0.1, far_deg(config), speed, 5.0 * speed)]
+    answer = emulate(config, motions, 0.1 + 1.5 * crossing_s + _CREEP_S, seed=seed)
+    moving = np.flatnonzero(answer.true_deg - answer.true_deg[0] > speed * _SETTLED_CREEP_S)
+    ripple = float(answer.true_speed_deg_s[moving[0] :].std()) if len(moving) else float("inf")
     return Check(
         f"creeping at {speed:.3g} deg/s",
         "speed of the table, deg/s",

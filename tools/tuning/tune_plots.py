@@ -31,9 +31,11 @@ def plots(tuning: Tuning) -> dict[str, str]:
 
 
 def _answers(tuning: Tuning) -> Drawing:
-    drawing = new_figure(10.5, 8.6, rows=3, columns=2)
-    for axes, (before, after) in zip(drawing.axes, tuning.checks, strict=True):
+    drawing = new_figure(10.5, 11.2, rows=(len(tuning.checks) + 1) // 2, columns=2)
+    for axes, (before, after) in zip(drawing.axes, tuning.checks, strict=False):
         _draw_check(axes, before, after)
+    for axes in drawing.axes[len(tuning.checks) :]:
+        axes.set_visible(False)
     drawing.legend(*drawing.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return drawing
 

@@ -7,9 +7,11 @@ from tools.html_report import figure_block, heading, page, paragraph, table_bloc
 from tools.tuning.bounds import Bound
 from tools.tuning.check import Figure
 from tools.tuning.checks import differs
+from tools.tuning.comparison_report import textbook_table, trade_table
 from tools.tuning.linear_model import duty_gains, quantisation_noise, speed_quantum_deg_s
 from tools.tuning.loop_figures import LoopFigures
 from tools.tuning.tuned_table import TunedSet, Tuning
+from tools.tuning.way_out import changes
 
 _SAME_SHARE = 0.05
 """Answers on the emulator that differ by less are as good as each other: so much depends on where the counts lie."""
@@ -23,6 +25,7 @@ def tune_report(tuning: Tuning, drawings: dict[str, str]) -> str:
             paragraph(_summary(tuning), "lead"),
             *_gains_section(tuning),
             *_linear_section(tuning),
+            *_comparison_section(tuning),
             *_emulator_section(tuning, drawings),
             *_frequency_section(drawings),
             *_spread_section(tuning, drawings),
@@ -33,13 +36,28 @@ def tune_report(tuning: Tuning, drawings: dict[str, str]) -> str:
 
 
 def _summary(tuning: Tuning) -> str:
-    parts = [f"{tuned.title}: bounded by {_names(tuned.design.binding)}" for tuned in tuning.sets.values()]
     figures = [pair for before, after in tuning.checks for pair in zip(before.figures, after.figures, strict=True)]
     better = sum(not _is_worse(old, new) for old, new in figures)
     return (
-        f"Both sets keep all bounds ({'; '.join(parts)}). On the emulator {better} of {len(figures)} figures are "
+        f"{_verdict(tuning)} On the emulator {better} of {len(figures)} figures are "
         f"as good as before, within {100 * _SAME_SHARE:.0f} %, or better."
     )
+
+
+def _verdict(tuning: Tuning) -> str:
+    if tuning.feasible:
+        parts = [f"{tuned.title}: bounded by {_names(tuned.design.binding)}" for tuned in tuning.sets.values()]
+        return f"Both sets keep all bounds ({'; '.join(parts)})."
+    parts = [
+        f"the {tuned.title} breaks {', '.join(map(tuned.design.stated, tuned.design.broken))}"
+        for tuned in tuning.sets.values()
+        if tuned.design.broken
+    ]
+    way = ""
+    if tuning.eased is not None:
+        options = " ".join(after.option for _, after in changes(tuning.limits, tuning.eased))
+        way = f" With {options} both sets keep all bounds."
+    return f"No gains keep all bounds: {'; '.join(parts)}.{way} This report judges the nearest gains."
 
 
 def _gains_section(tuning: Tuning) -> list[str]:
@@ -52,12 +70,30 @@ def _linear_section(tuning: Tuning) -> list[str]:
         heading("Figures of the linear loop, and their bounds"),
         paragraph(
             "Margins and noise are the worst of three states: the motor drives the table, the table drives "
-            "the motor, the load is free within the backlash. Answers are those of a table that is driven."
+            "the motor, the load is free within the backlash. Answers are those of a table that is driven. The noise "
+            "is that of the worst constant speed; a ramp passes all speeds, and its noise is their mean."
         ),
     ]
     for tuned in tuning.sets.values():
         blocks += [_figures_table(tuned), paragraph(f"Binding for the {tuned.title}: {_names(tuned.design.binding)}.")]
     return blocks
+
+
+def _comparison_section(tuning: Tuning) -> list[str]:
+    return [
+        heading("What the bound on the noise costs"),
+        paragraph(
+            "The best gains for other bounds on the noise, all other bounds as they are: lag of the ramp set, load "
+            "peak of the constant-speed set, and the ripple of the table's speed at creep on the emulator."
+        ),
+        trade_table(tuning.trades, tuning.limits),
+        heading("Beside textbook rules"),
+        paragraph(
+            "Both tuned sets and the rules SIMC and AMIGO, for a process of first order with a delay, on the same "
+            "figures. What breaks a bound of its set is marked; a rule is judged as a constant-speed set."
+        ),
+        textbook_table({tuned.title: tuned.design for tuned in tuning.sets.values()} | tuning.textbook, tuning.before),
+    ]
 
 
 def _emulator_section(tuning: Tuning, drawings: dict[str, str]) -> list[str]:
@@ -124,10 +160,16 @@ def _figures_table(tuned: TunedSet) -> str:
     for bound in tuned.design.bounds:
         after = _judged(bound, tuned.design.figures) + (" (binding)" if bound in tuned.design.binding else "")
         rows.append((bound.title, _limit(bound), _judged(bound, tuned.before_figures), after))
+    bounded = {bound.figure for bound in tuned.design.bounds}
     for title, field, scale, unit in (
+        ("noise at the PWM on a ramp", "ramp_noise_duty", 100.0, " % duty"),
+        ("overshoot after a step", "overshoot", 100.0, " %"),
+        ("settling after a step", "settling_s", 1e3, " ms"),
         ("lag on a ramp, measured speed error over acceleration", "ramp_lag_s", 1e3, " ms"),
         ("peak after a load step", "load_peak_deg_s_Nm", 1.0, " deg/s per Nm"),
     ):
+        if field in bounded:
+            continue
         values = [
             f"{float(getattr(figures, field)[0]) * scale:.3g}{unit}"
             for figures in (tuned.before_figures, tuned.design.figures)
@@ -214,6 +256,7 @@ def _noise(tuning: Tuning) -> str:
     count_deg, duty = quantisation_noise(tuning.before)
     return (
         f"The position is rounded to counts, a white noise of {count_deg:.2g} deg (standard "
-        "deviation), which the regulator turns into the noise at the PWM that is bounded above. The PWM is rounded to "
+        "deviation), which the regulator turns into the noise at the PWM on a ramp. At a constant speed the rounding "
+        "repeats, and is a sawtooth instead: the bound holds for the worst speed. The PWM is rounded to "
         f"steps, a white noise of {100 * duty:.2g} % duty at the plant's input."
     )

@@ -7,6 +7,7 @@ from tools.emulated import with_gains
 from tools.tuning.check import Check, Curve, Figure
 from tools.tuning.checks import all_checks, differences, differs
 from tools.tuning.linear_checks import load_step, load_step_Nm, ramp, step
+from tools.tuning.nonlinear_checks import creep
 
 CONFIG = load_config()
 CHECKS = all_checks(CONFIG, seed=1)
@@ -57,6 +58,16 @@ def test_the_model_changes_the_gain_set_after_the_ramp_as_the_firmware_does() ->
 
     for figure in ramp(config, 0).figures:
         assert figure.emulator == pytest.approx(figure.model, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_ripple_at_creep_is_that_of_a_moving_table_however_wide_the_gap(seed: int) -> None:
+    """The gap of 2 deg takes ten seconds at 0.2 deg/s."""
+    wide = replace(CONFIG, gears=replace(CONFIG.gears, backlash_arcmin=120.0))
+
+    ripple = creep(wide, seed).figures[0].emulator
+
+    assert ripple == pytest.approx(creep(CONFIG, seed).figures[0].emulator, rel=0.3)
 
 
 def test_a_difference_is_shown_without_what_the_model_lacks() -> None:

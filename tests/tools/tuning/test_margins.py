@@ -53,6 +53,22 @@ def test_margins_agree_with_a_brute_force_walk_along_the_loop(name: str, teeth: 
     assert_allclose(found.crossover_hz, frequency_hz[at_crossover], rtol=0.01)
 
 
+@pytest.mark.parametrize("factor", [0.5, 1.0, 1.6])
+@pytest.mark.parametrize("size", [256, 512, 1024])
+def test_the_peak_of_the_sensitivity_does_not_depend_on_the_grid(factor: float, size: int) -> None:
+    """Between the grid's frequencies: 1e-4 of a search in steps of a hundredth of a hertz."""
+    gains = scaled(fixed_gains(CONFIG, CONFIG.gains.hold), factor)
+    z = grid_z(size)
+    regulator = controller(duty_gains(CONFIG, gains), z)
+    for teeth in Teeth:
+        loop = (regulator.by_measured * plant_response([CONFIG], teeth, z).measured_by_duty)[0]
+        turn = np.exp(2j * np.pi * np.arange(1.0, 200.0, 0.01) / CONFIG.control.tick_hz)
+
+        found = margins(loop, grid_hz(CONFIG, size)).sensitivity_peak
+
+        assert_allclose(found, 1.0 / np.abs(1.0 + loop_transfer(teeth, gains)(turn)).min(), rtol=1e-4)
+
+
 @pytest.mark.parametrize("name", SETS)
 @pytest.mark.parametrize("teeth", Teeth)
 def test_the_shipped_gains_stay_out_of_the_circle_of_ms(name: str, teeth: Teeth) -> None:

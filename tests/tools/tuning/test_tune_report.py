@@ -36,6 +36,20 @@ def test_the_report_says_how_far_each_answer_is_from_the_model(tuning: Tuning) -
                 assert difference in (f"{abs(share):.0f} % {sign}", "0 %")
 
 
+def test_the_report_shows_what_is_not_bounded_and_compares_with_other_bounds_and_rules(tuning: Tuning) -> None:
+    html = tune_report(tuning, plots(tuning))
+    ramp = tuning.sets["ramp"].design.figures
+
+    assert cells(html, "overshoot after a step")[-1] == f"{100 * ramp.overshoot[0]:.3g} %"
+    asked = cells(html, "0.62")
+    assert asked[-1] == "asked"
+    lags = [float(cells(html, f"{100 * trade.noise_duty:.3g}")[0]) for trade in tuning.trades if trade.feasible]
+    assert len(lags) > 2
+    assert lags == sorted(lags, reverse=True)  # more noise, less lag
+    for name in ("SIMC PI", "AMIGO PI", "AMIGO PID", "ramp set", "constant-speed set"):
+        assert len(cells(html, name)) >= 9
+
+
 def test_the_report_names_the_binding_bounds_and_repeats(tuning: Tuning) -> None:
     html = tune_report(tuning, plots(tuning))
 

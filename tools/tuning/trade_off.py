@@ -1,0 +1,59 @@
+"""What the bound on the noise costs: both gain sets for stricter and looser bounds, and those of textbook rules."""
+
+from typing import NamedTuple
+
+from emulator.config import GainsConfig, TableConfig
+from emulator.pid import Gains, fixed_gains
+from emulator.toml_section import ConfigError
+from tools.emulated import with_gains
+from tools.tuning.bounds import Limits
+from tools.tuning.gain_design import Design, Scan, judged
+from tools.tuning.gain_files import gains_config
+from tools.tuning.nonlinear_checks import creep
+from tools.tuning.textbook_rules import process_of, textbook_gains
+from tools.tuning.way_out import SetDesigns, both_designs
+
+_SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
+"""Bounds on the noise, as shares of the one that was asked for."""
+
+
+class Trade(NamedTuple):
+    """The best gain sets for one bound on the noise."""
+
+    noise_duty: float
+    designs: SetDesigns
+    creep_ripple_deg_s: float  # on the emulator
+
+    @property
+    def feasible(self) -> bool:
+        """Whether both sets keep all bounds."""
+        return self.designs.stable and not self.designs.broken
+
+
+def trade_off(scanned: Scan, limits: Limits, seed: int) -> tuple[Trade, ...]:
+    """Return the best gain sets for several bounds on the noise, all other bounds as they are."""
+    trades = []
+    for share in _SHARES:
+        designs = both_designs(scanned, limits._replace(noise_duty=share * limits.noise_duty))
+        config = scanned.loops.config
+        after = with_gains(config, *(gains_config(config, each.gains) for each in designs))
+        trades.append(Trade(share * limits.noise_duty, designs, creep(after, seed).figures[0].emulator))
+    return tuple(trades)
+
+
+def textbook_designs(scanned: Scan, limits: Limits) -> dict[str, Design]:
+    """Return the gain sets of textbook rules, judged by the bounds of the constant-speed set."""
+    config, designs = scanned.loops.config, {}
+    for name, gains in textbook_gains(process_of(config)).items():
+        registers = _registers(config, gains)
+        if registers is not None:
+            designs[name] = judged(scanned.loops, registers, limits.for_hold())
+    return designs
+
+
+def _registers(config: TableConfig, gains: GainsConfig) -> Gains | None:
+    """Return a gain set as the firmware holds it; None if it does not fit."""
+    try:
+        return fixed_gains(config, gains)
+    except ConfigError:
+        return None

@@ -1,0 +1,113 @@
+"""Where no gains keep all bounds: bounds, eased in as few places as possible, within which both gain sets exist."""
+
+from collections.abc import Sequence
+from functools import partial
+from itertools import combinations
+from typing import NamedTuple
+
+from tools.tuning.bounds import Bound, Limits, violation
+from tools.tuning.gain_design import LEAST_LAG, LEAST_LOAD_PEAK, Design, Objective, Scan, design
+
+_MOST_EASED = 2
+_TRIES = 5
+_LOOSER = 0.05
+
+
+class SetDesigns(NamedTuple):
+    """Both gain sets, each the best within its bounds, or the nearest to them."""
+
+    ramp: Design
+    hold: Design
+
+    @property
+    def broken(self) -> tuple[Bound, ...]:
+        """The bounds that one of the sets or both break."""
+        return tuple({bound.figure: bound for each in self for bound in each.broken}.values())
+
+    @property
+    def stable(self) -> bool:
+        """Whether both loops are stable."""
+        return all(bool(each.figures.stable[0]) for each in self)
+
+
+def both_designs(scanned: Scan, limits: Limits) -> SetDesigns:
+    """Return the best gain sets within the limits, or those that break them least."""
+    return SetDesigns(*(design(scanned, bounds, objective) for bounds, objective in _tasks(limits)))
+
+
+def eased_limits(scanned: Scan, limits: Limits, refused: SetDesigns) -> Limits | None:
+    """Return limits within which both sets exist; None if no loop is stable.
+
+    Of one bound, or where that is not enough two, those are eased that need it least. Where that is not enough either,
+    all bounds that the nearest gains break are eased to what these keep.
+    """
+    if not refused.stable:
+        return None
+    candidates = sorted({bound.figure for each in refused for bound in each.binding})
+    for count in range(1, _MOST_EASED + 1):
+        groups = combinations(candidates, count)
+        found = [(eased, group) for group in groups if (eased := _eased_in(scanned, limits, group)) is not None]
+        for eased, group in sorted(found, key=lambda each: _cost(limits, each[0])):
+            if (proved := _proved(scanned, limits, eased, set(group))) is not None:
+                return proved
+    broken = {bound.figure for bound in refused.broken}
+    return _proved(scanned, limits, _allowing(limits, refused, broken), set(candidates))
+
+
+def changes(limits: Limits, eased: Limits) -> tuple[tuple[Bound, Bound], ...]:
+    """Return the bounds that differ, as they were and as they are eased."""
+    pairs = zip(limits.for_hold(), eased.for_hold(), strict=True)
+    return tuple((before, after) for before, after in pairs if before != after)
+
+
+def _tasks(limits: Limits) -> tuple[tuple[tuple[Bound, ...], Objective], ...]:
+    return (limits.for_ramp(), LEAST_LAG), (limits.for_hold(), LEAST_LOAD_PEAK)
+
+
+def _eased_in(scanned: Scan, limits: Limits, group: tuple[str, ...]) -> Limits | None:
+    """Return the limits with the bounds of a group as near as possible to what was asked; None if others break."""
+    designs = []
+    for bounds, objective in _tasks(limits):
+        eased = tuple(bound for bound in bounds if bound.figure in group)
+        kept = tuple(bound for bound in bounds if bound.figure not in group)
+        best = design(scanned, kept, partial(violation, eased) if eased else objective)
+        if best.broken or not best.figures.stable[0]:
+            return None
+        designs.append(best)
+    return _allowing(limits, designs, set(group))
+
+
+def _allowing(limits: Limits, designs: Sequence[Design], figures: set[str]) -> Limits:
+    """Return the limits with some eased so far that each of the designs keeps them; none becomes stricter."""
+    eased = {}
+    for bound in limits.for_hold():
+        values = [float(getattr(each.figures, bound.figure)[0]) for each in designs if _has(each, bound)]
+        broken = [value for value in values if (value > bound.limit if bound.at_most else value < bound.limit)]
+        if bound.figure in figures and broken:
+            eased[bound.figure] = bound.allowing(max(broken) if bound.at_most else min(broken))
+    return limits._replace(**eased)
+
+
+def _has(designed: Design, bound: Bound) -> bool:
+    """Return whether a bound is one of the set's: the ramp set has none on its answer to a step."""
+    figures = {each.figure for each in designed.bounds}
+    return bound.figure in figures or bound.figure in {each.figure for each in Limits().for_ramp()}
+
+
+def _proved(scanned: Scan, limits: Limits, eased: Limits, group: set[str]) -> Limits | None:
+    """Return eased limits for which the search finds both sets, with the group's bounds looser if need be."""
+    for _ in range(_TRIES):
+        designs = both_designs(scanned, eased)
+        if designs.stable and not designs.broken:
+            return eased
+        looser = {
+            after.figure: after.allowing(after.limit * (1.0 + _LOOSER if after.at_most else 1.0 - _LOOSER))
+            for _, after in changes(limits, eased)
+        }
+        eased = _allowing(eased._replace(**looser), designs, group)
+    return None
+
+
+def _cost(limits: Limits, eased: Limits) -> float:
+    """Return by what share the eased bounds are away from what was asked."""
+    return sum(abs(after.limit / before.limit - 1.0) for before, after in changes(limits, eased))
