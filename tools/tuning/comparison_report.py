@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from emulator.config import TableConfig
+from emulator.config.table_config import TableConfig
 from tools.html_report import table_block
 from tools.tuning.bounds import Limits
 from tools.tuning.gain_design import Design

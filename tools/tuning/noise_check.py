@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from emulator.config import TableConfig
-from emulator.pid import fixed_gains
+from emulator.config.constants import fixed_gains
+from emulator.config.table_config import TableConfig
 from tools.emulated import Array, Motion, emulate
 from tools.tuning.check import Check, Curve, Figure, far_deg
 from tools.tuning.frequency_response import GRID_SIZE

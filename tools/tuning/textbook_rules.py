@@ -11,7 +11,7 @@ the speed's window, the tick of the PWM's buffer, and half a tick of the PWM's h
 
 from typing import NamedTuple
 
-from emulator.config import GainsConfig, TableConfig
+from emulator.config.table_config import GainsConfig, TableConfig
 from tools.tuning.linear_model import Teeth, speed_gain_deg_s, time_constant_s
 
 

@@ -2,9 +2,10 @@
 
 from typing import NamedTuple
 
-from emulator.config import GainsConfig, TableConfig
-from emulator.pid import Gains, fixed_gains
-from emulator.toml_section import ConfigError
+from emulator.config.constants import fixed_gains
+from emulator.config.table_config import GainsConfig, TableConfig
+from emulator.config.toml_section import ConfigError
+from emulator.firmware.pid import Gains
 from tools.emulated import with_gains
 from tools.tuning.bounds import Limits
 from tools.tuning.gain_design import Design, Scan, judged

@@ -181,5 +181,5 @@ def test_an_absolute_target_counts_from_the_reference_with_its_fraction() -> Non
 @pytest.mark.parametrize("seconds", [1e-9, 0.25])
 def test_the_protection_waits_at_least_a_tick(seconds: float) -> None:
     protection = replace(CONFIG.protection, stall_time_s=seconds, settling_time_s=seconds)
-    parameters = firmware(replace(CONFIG, protection=protection))
+    parameters = firmware_constants(replace(CONFIG, protection=protection))
     assert parameters.stall_ticks == parameters.settling_ticks == max(1, seconds * 1000)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emulator.config import load_config
+from emulator.config.table_config import load_config
 from tools.tuning.noise_check import noise
 from tools.tuning.speed_noise import steady_noise
 
