@@ -26,7 +26,7 @@ LEAST_LOAD_PEAK: Objective = attrgetter("load_peak_deg_s_Nm")
 
 _COARSE = (18, 18, 9)
 _FINE = (7, 7, 7)
-_ZOOMS = 6
+ZOOMS = 6
 _BINDING_SHARE = 0.02
 _BATCH = 1 << 20
 """Candidates times frequencies that are judged at once, for the sake of the memory."""
@@ -70,17 +70,18 @@ def scan(loops: Loops) -> Scan:
     return Scan(loops, points, _figures(loops, points), reach)
 
 
-def design(scanned: Scan, bounds: tuple[Bound, ...], objective: Objective) -> Design:
+def design(scanned: Scan, bounds: tuple[Bound, ...], objective: Objective, zooms: int = ZOOMS) -> Design:
     """Return the gain set with the least `objective` within the bounds.
 
     Args:
         scanned: The coarse scan of the table's loops.
         bounds: What the gain set must keep.
         objective: What is to be least of a loop's figures, such as `LEAST_LAG` or `LEAST_LOAD_PEAK`.
+        zooms: How often the search zooms in; each time makes the steps three times as fine.
     """
     loops, reach = scanned.loops, scanned.reach
     best = scanned.points[_best(scanned.figures, bounds, objective)]
-    for _ in range(_ZOOMS):
+    for _ in range(zooms):
         points, reach = _grid(best - reach, best + reach, _FINE)
         best = points[_best(_figures(loops, points), bounds, objective)]
     return judged(loops, Gains(*(int(value) for value in _registers(loops, best[None])[0])), bounds)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tools.tuning.frequency_response import Array, Complex, PlantResponse
 
-_PLACES = np.linspace(0.0, 4.0, 401)
+_PLACES = np.linspace(0.0, 4.0, 101)
 _QUARTIC = np.stack(  # Lagrange's polynomials of the points 0, 1, 2, 3, 4
     [
         np.prod([(_PLACES - other) / (point - other) for other in range(5) if other != point], axis=0)
@@ -66,7 +66,7 @@ def _least_size(curve: Complex) -> Array:
     nearest = np.abs(curve).argmin(axis=-1)
     first = np.clip(nearest - 2, 0, curve.shape[-1] - 5)
     points = np.take_along_axis(curve, first[..., None] + np.arange(5), axis=-1)
-    result: Array = np.abs(points @ _QUARTIC.T).min(axis=-1)
+    result: Array = np.abs(np.einsum("...p,qp->...q", points, _QUARTIC)).min(axis=-1)
     return result
 
 

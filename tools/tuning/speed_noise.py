@@ -8,6 +8,7 @@ regulator amplifies each line by its own response, so some speeds are noisier th
 from functools import lru_cache
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tools.tuning.frequency_response import Array
 
@@ -24,7 +25,8 @@ def steady_noise(power: Array, most_count_tick: float) -> tuple[Array, Array]:
     """
     share, lines = _lines(power.shape[-1])
     reached = max(1, int(np.searchsorted(share, most_count_tick, side="right")))
-    variance = power @ lines[:reached].T
+    with threadpool_limits(1, "blas"):  # on a busy computer the threads of a BLAS wait for each other
+        variance = power @ lines[:reached].T
     worst = variance.argmax(axis=-1)
     deviation: Array = np.sqrt(np.take_along_axis(variance, worst[..., None], axis=-1)[..., 0])
     return deviation, share[worst]

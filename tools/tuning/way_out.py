@@ -10,6 +10,8 @@ from tools.tuning.gain_design import LEAST_LAG, LEAST_LOAD_PEAK, Design, Objecti
 
 _MOST_EASED = 2
 _TRIES = 5
+_ZOOMS = 3
+"""Enough to see by how much a bound has to give way: its new value is rounded to two digits."""
 _LOOSER = 0.05
 
 
@@ -70,7 +72,7 @@ def _eased_in(scanned: Scan, limits: Limits, group: tuple[str, ...]) -> Limits |
     for bounds, objective in _tasks(limits):
         eased = tuple(bound for bound in bounds if bound.figure in group)
         kept = tuple(bound for bound in bounds if bound.figure not in group)
-        best = design(scanned, kept, partial(violation, eased) if eased else objective)
+        best = design(scanned, kept, partial(violation, eased) if eased else objective, _ZOOMS)
         if best.broken or not best.figures.stable[0]:
             return None
         designs.append(best)
