@@ -311,3 +311,13 @@ def test_leaps_to_whole_lines_change_neither_bytes_nor_times(calls: list[tuple[s
         assert call(leaping, name, what) == call(stepping, name, what), (name, what)
         assert leaping.table.tick == stepping.table.tick, (name, what)
     assert leaping.table.status() == stepping.table.status()
+
+
+def test_only_a_url_in_the_wrong_form_is_answered_with_the_form(tmp_path: Path) -> None:
+    path = tmp_path / "table.toml"
+    path.write_text("[gears]\nratio = -1\n", encoding="utf-8")
+
+    with pytest.raises(serial.SerialException, match=r"table\.toml: gears\.ratio is -1; it must be at least 1$"):
+        serial.serial_for_url(f"emulator://?config={path}")
+    with pytest.raises(serial.SerialException, match=r"the form is emulator://"):
+        serial.serial_for_url("emulator://?seed=x")
