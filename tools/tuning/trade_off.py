@@ -14,7 +14,7 @@ from tools.tuning.nonlinear_checks import creep
 from tools.tuning.textbook_rules import process_of, textbook_gains
 from tools.tuning.way_out import SetDesigns, both_designs
 
-_SHARES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
+_SHARES = (0.25, 0.35, 0.5, 0.7, 1.0, 1.5, 2.0)
 """Bounds on the noise, as shares of the one that was asked for."""
 
 

@@ -3,6 +3,7 @@
 import random
 from dataclasses import replace
 from fractions import Fraction
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,13 @@ from emulator.config.constants import firmware_constants
 from emulator.config.table_config import TableConfig, load_config
 from emulator.firmware.controller import FirmwareState, begin_motion, power_on, step
 from emulator.firmware.fixed_point import to_fixed
+from emulator.firmware.pid import HOLD, RAMP, Gains, Pid, PidState
+from emulator.firmware.pid import step as regulator_step
 from emulator.firmware.profiler import Profile
 from emulator.int32 import INT32_MAX
 from emulator.table.batch import COLUMNS, MOVE_BY, MOVE_TO, advance, run
 from emulator.table.interpreter import Interpreter
+from emulator.table.machine_code import compiled
 from emulator.table.table import Table
 from protocol.messages import Command, Verb
 
@@ -163,3 +167,16 @@ def test_a_table_does_not_creep_faster_than_its_limit() -> None:
         power_on=replace(DEFAULT.power_on, speed_deg_s=0.3),
     )
     assert firmware_constants(config).approach_speed == motion_of(config, 0.0, 0.3, 1.0)[1]
+
+
+@pytest.mark.parametrize("gain_set", [RAMP, HOLD])
+def test_no_product_of_the_regulator_leaves_64_bits(gain_set: int) -> None:
+    """Compiled, 64 bits wrap without a word; interpreted, integers are as long as need be: both must agree."""
+    widest = Gains(INT32_MAX, INT32_MAX, INT32_MAX)
+    regulator = Pid(widest, Gains(1, INT32_MAX, INT32_MAX), duty_max=2047)
+    step_64 = compiled(regulator_step)
+    ends = (-INT32_MAX - 1, -1, 0, INT32_MAX)
+    for demand, measured, before, integral in product(ends, ends, ends, (-(2047 << 20), 0, 2047 << 20)):
+        state = PidState(integral, before, RAMP, 0)
+        after = regulator_step(regulator, state, gain_set, demand, measured)
+        assert tuple(step_64(regulator, state, gain_set, demand, measured)) == tuple(after)

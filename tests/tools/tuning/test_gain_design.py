@@ -33,7 +33,7 @@ def test_no_other_gains_within_the_bounds_are_clearly_better(bounds: tuple[Bound
 
 @pytest.mark.parametrize(
     "limits",
-    [Limits(bandwidth_hz=60.0), Limits(noise_duty=0.001)],
+    [Limits(bandwidth_hz=60.0), Limits(noise_duty=0.0003)],
 )
 def test_the_way_out_lets_both_sets_exist_and_makes_nothing_stricter(limits: Limits) -> None:
     refused = both_designs(SCAN, limits)
