@@ -13,12 +13,12 @@ from tools.emulated import with_gains
 from tools.tuning.bounds import Limits
 from tools.tuning.check import Check
 from tools.tuning.checks import Difference, all_checks, differences
-from tools.tuning.gain_design import Design, scan
+from tools.tuning.gain_design import Design, Scan, scan
 from tools.tuning.gain_files import gains_config
 from tools.tuning.loop_figures import LoopFigures, Loops, loop_figures
 from tools.tuning.monte_carlo import Outcome, monte_carlo, spread_tables
 from tools.tuning.trade_off import Trade, textbook_designs, trade_off
-from tools.tuning.way_out import both_designs, eased_limits
+from tools.tuning.way_out import SetDesigns, both_designs, changes, eased_limits, proved
 
 _LEAST_ANSWER_S = 0.5
 
@@ -78,7 +78,7 @@ def tune(
     designs = both_designs(scanned, limits)
     if not designs.stable:
         raise TuningError("no gains make the speed loop stable; shorten control.speed_window_ticks or the tick")
-    eased = eased_limits(scanned, limits, designs) if designs.broken else None
+    eased = _eased(scanned, limits, designs) if designs.broken else None
     ramp, hold = designs
     progress(0.3)
     after = with_gains(config, gains_config(config, ramp.gains), gains_config(config, hold.gains))
@@ -109,3 +109,12 @@ def grid_size(config: TableConfig, limits: Limits) -> int:
     """Return the ticks, a power of two, in which the slowest loop within the limits has answered to a step."""
     answer_s = max(_LEAST_ANSWER_S, 5.0 / limits.bandwidth_hz, 5.0 * limits.settling_s)
     return 1 << ceil(log2(answer_s * config.control.tick_hz))
+
+
+def _eased(scanned: Scan, limits: Limits, refused: SetDesigns) -> Limits | None:
+    """Return limits that can be kept, proved on the grid on which a tuning within them would search."""
+    eased, config = eased_limits(scanned, limits, refused), scanned.loops.config
+    if eased is None or grid_size(config, eased) == grid_size(config, limits):
+        return eased
+    finer = scan(Loops.of([config], grid_size(config, eased)))
+    return proved(finer, limits, eased, {after.figure for _, after in changes(limits, eased)})

@@ -50,10 +50,10 @@ def eased_limits(scanned: Scan, limits: Limits, refused: SetDesigns) -> Limits |
         groups = combinations(candidates, count)
         found = [(eased, group) for group in groups if (eased := _eased_in(scanned, limits, group)) is not None]
         for eased, group in sorted(found, key=lambda each: _cost(limits, each[0])):
-            if (proved := _proved(scanned, limits, eased, set(group))) is not None:
-                return proved
+            if (found_limits := proved(scanned, limits, eased, set(group))) is not None:
+                return found_limits
     broken = {bound.figure for bound in refused.broken}
-    return _proved(scanned, limits, _allowing(limits, refused, broken), set(candidates))
+    return proved(scanned, limits, _allowing(limits, refused, broken), set(candidates))
 
 
 def changes(limits: Limits, eased: Limits) -> tuple[tuple[Bound, Bound], ...]:
@@ -96,7 +96,7 @@ def _has(designed: Design, bound: Bound) -> bool:
     return bound.figure in figures or bound.figure in {each.figure for each in Limits().for_ramp()}
 
 
-def _proved(scanned: Scan, limits: Limits, eased: Limits, group: set[str]) -> Limits | None:
+def proved(scanned: Scan, limits: Limits, eased: Limits, group: set[str]) -> Limits | None:
     """Return eased limits for which the search finds both sets, with the group's bounds looser if need be."""
     for _ in range(_TRIES):
         designs = both_designs(scanned, eased)
