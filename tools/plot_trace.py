@@ -1,137 +1,197 @@
-"""Draw a trace of the stand-in: `python -m tools.plot_trace TRACE --out FILE.png`.
+"""Draw a trace of the emulator: `python -m tools.plot_trace TRACE --out FILE.png`.
 
 From top to bottom: reference and measured speed with the commands that made them, position, and what the motor did.
 """
 
 import argparse
 import sys
+from math import inf
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from emulator.trace import Trace, read_trace
 from planner.whole_file import whole_file
-from protocol import LineBuffer
+from protocol.data_file import did_you_mean
 from tools.command_line import ended
+from tools.command_marks import commands_of, mark_commands
+from tools.envelope import envelope
 
-_EXAMPLE = """example:
+_EXAMPLE = """examples:
   python -m emulator --pty --trace run.csv
   python -m tools.plot_trace run.csv --out run.png
+  python -m tools.plot_trace run.csv --out detail.png --from 12 --to 14.5 --signals speed_deg_s,duty
+
+Of commands close together the first ones are labeled, with the number of the others.
 """
 
 _REFERENCE, _MEASURED, _TRUE, _DUTY, _CURRENT = "#c8c8c8", "#0072b2", "#56b4e9", "#009e73", "#d55e00"
 """Colours that remain apart for colour-blind readers (Okabe and Ito)."""
 
-_MOTION_VERBS = "PRSA"
-_LABEL_POINTS = 8.0
-_LABEL_SHARE = 0.03
-"""Commands closer together than this share of the run stand under one another, at the first one's time."""
 _FIGURE_INCHES = (10.0, 7.5)
+_THIN, _WIDE = 0.9, 4.0
+_LEGEND_SHARE = 0.25
+"""Room above the curves for a legend, as a share of their range."""
 
 
-def commands_of(trace: Trace) -> list[tuple[float, str]]:
-    """Return the lines that change the motion, each with the time in seconds at which its CR was received."""
-    lines = LineBuffer()
-    return [
-        (float(time_s), text)
-        for time_s, data in zip(trace.time_s, trace.received, strict=True)
-        for line in lines.feed(data)
-        if isinstance(line, bytes) and (text := line.decode("ascii").strip())[0] in _MOTION_VERBS
-    ]
+class Signal(NamedTuple):
+    """How a column of the trace is drawn."""
+
+    label: str
+    color: str
+    linewidth: float = _THIN
+    factor: float = 1.0
 
 
-def draw_trace(trace: Trace, title: str = "") -> Figure:
+class Panel(NamedTuple):
+    """Axes with the signals that may stand in them, by column, in the order in which they are drawn."""
+
+    ylabel: str
+    height: float
+    signals: dict[str, Signal]
+
+
+_PANELS = (
+    Panel(
+        "speed (deg/s)",
+        3.0,
+        {
+            "reference_speed_deg_s": Signal("reference", _REFERENCE, _WIDE),
+            "true_speed_deg_s": Signal("true", _TRUE),
+            "speed_deg_s": Signal("measured", _MEASURED),
+        },
+    ),
+    Panel(
+        "position (deg)",
+        2.0,
+        {
+            "reference_deg": Signal("reference", _REFERENCE, _WIDE),
+            "true_deg": Signal("true", _TRUE),
+            "encoder_deg": Signal("encoder", _MEASURED),
+        },
+    ),
+    Panel("duty (%)", 2.0, {"duty": Signal("duty", _DUTY, factor=100.0)}),
+    Panel("current (mA)", 2.0, {"current_A": Signal("current", _CURRENT, factor=1000.0)}),
+)
+SIGNALS = tuple(name for panel in _PANELS for name in panel.signals)
+_DEFAULT_SIGNALS = tuple(name for name in SIGNALS if name != "true_deg")
+
+
+def draw_trace(
+    trace: Trace,
+    title: str = "",
+    from_s: float | None = None,
+    to_s: float | None = None,
+    signals: tuple[str, ...] = _DEFAULT_SIGNALS,
+) -> Figure:
     """Return the figure of a trace.
 
     Args:
-        trace: a run of at least one tick.
-        title: stands above the figure.
+        trace: A run of at least one tick.
+        title: Stands above the figure.
+        from_s: Start of what is drawn; the trace's start by default.
+        to_s: End of what is drawn; the trace's end by default.
+        signals: Columns of the trace, of `SIGNALS`.
 
     Raises:
-        ValueError: the trace is empty.
+        ValueError: The trace is empty, no part of it lies between the times, or a signal is not known.
     """
     if not len(trace.time_s):
         raise ValueError(f"{title}: the trace holds no tick; record it until something has happened")
+    _check_signals(signals)
+    rows, (begin_s, end_s) = _selection(trace, from_s, to_s)
+    panels = [panel for panel in _PANELS if not panel.signals.keys().isdisjoint(signals)]
     figure = Figure(figsize=_FIGURE_INCHES, layout="constrained")
     FigureCanvasAgg(figure)
-    speed, position, motor = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 2))
+    axes = figure.subplots(
+        len(panels), 1, sharex=True, squeeze=False, height_ratios=[panel.height for panel in panels]
+    )[:, 0].tolist()
     figure.suptitle(title)
-
-    speed.plot(trace.time_s, trace.reference_speed_deg_s, color=_REFERENCE, linewidth=4.0, label="reference")
-    speed.plot(trace.time_s, trace.true_speed_deg_s, color=_TRUE, linewidth=0.9, label="true")
-    speed.plot(trace.time_s, trace.speed_deg_s, color=_MEASURED, linewidth=0.9, label="measured")
-    speed.set_ylabel("speed (deg/s)")
-
-    position.plot(trace.time_s, trace.reference_deg, color=_REFERENCE, linewidth=4.0, label="reference")
-    position.plot(trace.time_s, trace.encoder_deg, color=_MEASURED, linewidth=0.9, label="encoder")
-    position.set_ylabel("position (deg)")
-
-    motor.plot(trace.time_s, 100.0 * trace.duty, color=_DUTY, linewidth=0.9, label="duty")
-    motor.set_ylabel("duty (%)", color=_DUTY)
-    motor.set_xlabel("time (s)")
-    current = motor.twinx()
-    current.plot(trace.time_s, 1000.0 * trace.current_A, color=_CURRENT, linewidth=0.9, label="current")
-    current.set_ylabel("current (mA)", color=_CURRENT)
-    motor.set_zorder(current.get_zorder() + 1.0)  # the current is the noisier: it must not hide the duty
-    motor.patch.set_visible(False)
-
-    for axes in (motor, current):  # both zeros at the same height
-        farthest = max(map(abs, axes.get_ylim()))
-        axes.set_ylim(-farthest, farthest)
-    for axes in (speed, position, motor):
-        axes.grid(alpha=0.25)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.margins(x=0.0)
-    current.spines["top"].set_visible(False)
-    speed.legend(loc="upper right", edgecolor="none", ncols=3)
-    position.legend(loc="upper left", edgecolor="none", ncols=2)
-    _mark_commands(speed, (position, motor), commands_of(trace))
+    for each, panel in zip(axes, panels, strict=True):
+        _draw_panel(each, panel, trace, rows, signals)
+    axes[-1].set_xlabel("time (s)")
+    if end_s > begin_s:
+        axes[0].set_xlim(begin_s, end_s)
+    mark_commands(axes, commands_of(trace))
     return figure
+
+
+def _check_signals(signals: tuple[str, ...]) -> None:
+    for name in signals:
+        if name not in SIGNALS:
+            raise ValueError(f"{name!r} is not a signal; allowed are {', '.join(SIGNALS)}{did_you_mean(name, SIGNALS)}")
+    if not signals:
+        raise ValueError(f"no signal to draw; allowed are {', '.join(SIGNALS)}")
+
+
+def _selection(trace: Trace, from_s: float | None, to_s: float | None) -> tuple[slice, tuple[float, float]]:
+    """Return the rows to draw, with a neighbor at each end as nothing changes in between, and the time's limits."""
+    first_s, last_s = float(trace.time_s[0]), float(trace.time_s[-1])
+    begin_s, end_s = first_s if from_s is None else from_s, last_s if to_s is None else to_s
+    for name, value in (("--from", begin_s), ("--to", end_s)):
+        if not -inf < value < inf:
+            raise ValueError(f"{name} is {value:g}; it must be a time in seconds")
+    if from_s is not None and to_s is not None and not begin_s < end_s:
+        raise ValueError(f"--from is {begin_s:g}, --to is {end_s:g}; --from must be less than --to")
+    limits_s = max(begin_s, first_s), min(end_s, last_s)
+    if limits_s[0] >= limits_s[1] and (from_s, to_s) != (None, None):
+        raise ValueError(
+            f"no part of the trace lies within {begin_s:g} to {end_s:g} s; it runs from {first_s:g} to {last_s:g} s"
+        )
+    first = int(np.searchsorted(trace.time_s, begin_s, side="right")) - 1
+    last = int(np.searchsorted(trace.time_s, end_s))
+    return slice(max(first, 0), last + 1), limits_s
+
+
+def _draw_panel(axes: Axes, panel: Panel, trace: Trace, rows: slice, signals: tuple[str, ...]) -> None:
+    chosen = {name: signal for name, signal in panel.signals.items() if name in signals}
+    for name, signal in chosen.items():
+        times_s, values = envelope(trace.time_s[rows], signal.factor * getattr(trace, name)[rows])
+        axes.plot(times_s, values, color=signal.color, linewidth=signal.linewidth, label=signal.label)
+    axes.set_ylabel(panel.ylabel)
+    axes.grid(alpha=0.25)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(x=0.0)
+    if len(chosen) > 1:
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + _LEGEND_SHARE * (high - low))
+        axes.legend(loc="upper right", edgecolor="none", framealpha=0.7, ncols=len(chosen))
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     parser = argparse.ArgumentParser(
         prog="python -m tools.plot_trace",
-        description="Draw a trace that the stand-in recorded.",
+        description="Draw a trace that the emulator recorded.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("trace", metavar="TRACE", type=Path, help="a .csv or .npz file of python -m emulator --trace")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="the picture: .png, .svg or .pdf")
+    parser.add_argument(
+        "--from", dest="from_s", metavar="S", type=float, help="start time in s (default: of the trace)"
+    )
+    parser.add_argument("--to", dest="to_s", metavar="S", type=float, help="end time in s (default: of the trace)")
+    parser.add_argument(
+        "--signals",
+        metavar="NAME,...",
+        default=",".join(_DEFAULT_SIGNALS),
+        help=f"columns to draw, of {', '.join(SIGNALS)} (default: all but true_deg)",
+    )
     options = parser.parse_args(arguments)
     return ended("plot_trace", lambda: _draw(options), ValueError)
 
 
 def _draw(options: argparse.Namespace) -> int:
-    save_figure(draw_trace(read_trace(options.trace), options.trace.name), options.out)
+    signals = tuple(name.strip() for name in options.signals.split(",") if name.strip())
+    _check_signals(signals)
+    figure = draw_trace(read_trace(options.trace), options.trace.name, options.from_s, options.to_s, signals)
+    save_figure(figure, options.out)
     return 0
-
-
-def _mark_commands(labelled: Axes, others: tuple[Axes, ...], commands: list[tuple[float, str]]) -> None:
-    """Draw a line through all axes at each group of commands, with their text above the first axes."""
-    begin_s, end_s = labelled.get_xlim()
-    groups: list[tuple[float, list[str]]] = []
-    for time_s, text in commands:
-        if groups and time_s - groups[-1][0] < _LABEL_SHARE * (end_s - begin_s):
-            groups[-1][1].append(text)
-        else:
-            groups.append((time_s, [text]))
-    for time_s, texts in groups:
-        for axes in (labelled, *others):
-            axes.axvline(time_s, color="black", linewidth=0.6, alpha=0.5, zorder=0.5)
-        labelled.annotate(
-            "\n".join(texts),
-            (time_s, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, 3),
-            textcoords="offset points",
-            fontsize=_LABEL_POINTS,
-            va="bottom",
-            ha="center",
-        )
 
 
 def save_figure(figure: Figure, path: Path) -> None:

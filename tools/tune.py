@@ -2,9 +2,14 @@
 
     python -m tools.tune --out build/tune
     python -m tools.tune --config table.toml --ms 1.6 --noise 0.3 --out build/tune
+    python -m tools.tune --judge gains.toml --out build/judge
 
-Writes gains.toml (for `python -m emulator --config`), gains.h, report.html and its plots. Where no gains keep all
-bounds, it writes the report and its plots, prints a command line that works, and ends with status 2.
+Writes gains.toml (for `python -m emulator --config`), gains.h, figures.json, report.html and its plots. Where no gains
+keep all bounds, it writes all but gains.toml and gains.h, prints a command line that works, and ends with status 2.
+
+With --judge no gains are searched: the same report is written for the gains of a file, whether the bounds hold or not.
+Its [gains.ramp] and [gains.hold] have proportional_duty_s_deg, integral_time_s and derivative_time_s. The exit status
+is 0 if all bounds hold, 1 if not, and 2 for an input that cannot be used.
 """
 
 import argparse
@@ -20,10 +25,15 @@ from planner.whole_file import whole_file
 from tools.command_line import check_folder, ended
 from tools.progress import Progress
 from tools.tuning.bounds import Limits
+from tools.tuning.figures_json import figures_json
+from tools.tuning.gain_design import Design
 from tools.tuning.gain_files import gains_header, gains_toml
+from tools.tuning.given_gains import given_gains
 from tools.tuning.tune_plots import plots
-from tools.tuning.tune_report import tune_report
-from tools.tuning.tuned_table import Tuning, TuningError, tune
+from tools.tuning.tune_report import tune_report, verdict
+from tools.tuning.tuned_table import Tuning, TuningError, judge, tune
+
+_TUNE_FOLDER, _JUDGE_FOLDER = Path("build/tune"), Path("build/judge")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -33,16 +43,34 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _tune(options: argparse.Namespace) -> int:
+    if options.judge:
+        return _judge(options)
     config = load_config(options.config)
     limits = _limits(options)
-    check_folder(options.out)
+    folder = options.out or _TUNE_FOLDER
+    check_folder(folder)
     with Progress("tuning") as progress:
         tuning = tune(config, limits, options.plants, options.spread / 100.0, options.seed, progress.show)
-    _write(options.out, tuning)
+    _write(folder, tuning)
     if not tuning.feasible:
         raise TuningError(_refusal(tuning, options))
     _print(tuning)
     return 0
+
+
+def _judge(options: argparse.Namespace) -> int:
+    config, gains = given_gains(options.judge, options.config)
+    limits = _limits(options)
+    folder = options.out or _JUDGE_FOLDER
+    if options.judge.resolve() == (folder / "gains.toml").resolve():
+        raise TuningError(f"{options.judge} would be overwritten; --out must be another folder")
+    check_folder(folder)
+    with Progress("judging") as progress:
+        tuning = judge(config, gains, limits, options.plants, options.spread / 100.0, options.seed, progress.show)
+    _write(folder, tuning)
+    _print(tuning)
+    print(verdict(tuning))
+    return 0 if tuning.feasible else 1
 
 
 def _refusal(tuning: Tuning, options: argparse.Namespace) -> str:
@@ -60,7 +88,9 @@ def _refusal(tuning: Tuning, options: argparse.Namespace) -> str:
 
 def _command_line(options: argparse.Namespace, limits: Limits) -> str:
     """Return the command line with other limits."""
-    words = ["python", "-m", "tools.tune", "--out", str(options.out)]
+    words = ["python", "-m", "tools.tune"]
+    if options.out is not None:
+        words += ["--out", str(options.out)]
     if options.config is not None:
         words += ["--config", str(options.config)]
     for bound, usual in zip(limits.for_hold(), Limits().for_hold(), strict=True):
@@ -102,12 +132,13 @@ def _write(folder: Path, tuning: Tuning) -> None:
         gains = {name: tuned.design.gains for name, tuned in tuning.sets.items()}
         files = {"gains.toml": gains_toml(tuning.after), "gains.h": gains_header(tuning.after, gains)}
     files |= {f"{name}.svg": drawing for name, drawing in drawings.items()}
+    files["figures.json"] = figures_json(tuning)
     files["report.html"] = tune_report(tuning, drawings)
     folder.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
         for name, text in files.items():
             stack.enter_context(whole_file(folder / name)).write_text(text, encoding="utf-8")
-    written = "gains.toml, gains.h, report.html" if tuning.feasible else "report.html"
+    written = "gains.toml, gains.h, figures.json, report.html" if tuning.feasible else "figures.json, report.html"
     print(f"wrote {written} and plots to {folder}", file=sys.stderr)
 
 
@@ -117,7 +148,7 @@ def _print(tuning: Tuning) -> None:
         print(
             f"{tuned.title}: K {gains.proportional_duty_s_deg:.5f} duty s/deg, "
             f"Ti {1e3 * gains.integral_time_s:.3f} ms, Td {1e3 * gains.derivative_time_s:.3f} ms; "
-            f"bounded by {', '.join(map(str, tuned.design.binding)) or 'nothing'}; "
+            f"{_bounds(tuned.design)}; "
             f"{100 * tuned.spread.all_share:.0f} % of the spread plants meet all bounds"
         )
     for before, after in tuning.checks:
@@ -126,13 +157,24 @@ def _print(tuning: Tuning) -> None:
             print(f"{new.title}: {old.emulator:.3g} -> {new.emulator:.3g} {new.unit}{foretold}")
 
 
+def _bounds(design: Design) -> str:
+    if not design.figures.stable[0]:
+        return "not stable"
+    if design.broken:
+        return f"breaks {', '.join(map(str, design.broken))}"
+    return f"bounded by {', '.join(map(str, design.binding)) or 'nothing'}"
+
+
 def _parser() -> argparse.ArgumentParser:
     defaults = Limits()
     parser = argparse.ArgumentParser(
         prog="python -m tools.tune", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--config", type=Path, help="TOML with the table's constants that differ from the default ones")
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR")
+    parser.add_argument("--judge", type=Path, metavar="GAINS.toml", help="gains to judge, instead of a search")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help=f"output folder (default: {_TUNE_FOLDER}, with --judge {_JUDGE_FOLDER})"
+    )
     parser.add_argument("--ms", type=float, default=defaults.sensitivity_peak, help="maximum Ms (default: %(default)s)")
     parser.add_argument(
         "--gain-margin",

@@ -1,10 +1,12 @@
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from emulator import Table, load_config
 from emulator.trace import TraceWriter, read_trace
-from tools.plot_trace import commands_of, main
+from tools.command_marks import commands_of
+from tools.plot_trace import SIGNALS, draw_trace, main
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +41,16 @@ def test_what_cannot_be_drawn_is_one_line_and_status_2(
     trace_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     TraceWriter(tmp_path / "empty.csv", 1000).close()
+    drawn = [str(trace_path), "--out", str(tmp_path / "run.png")]
     for arguments in (
+        [*drawn, "--from", "nan"],
+        [*drawn, "--to", "inf"],
+        [*drawn, "--from", "3", "--to", "3"],
+        [*drawn, "--from", "5", "--to", "2"],
+        [*drawn, "--from", "1000"],
+        [*drawn, "--to", "-1"],
+        [*drawn, "--signals", "speed"],
+        [*drawn, "--signals", ","],
         [str(tmp_path / "none.csv"), "--out", str(tmp_path / "run.png")],
         [str(tmp_path / "empty.csv"), "--out", str(tmp_path / "run.png")],
         [str(trace_path), "--out", str(tmp_path / "run.unknown")],
@@ -47,3 +58,32 @@ def test_what_cannot_be_drawn_is_one_line_and_status_2(
     ):
         assert main(arguments) == 2
         assert capsys.readouterr().err.count("\n") == 1
+        assert not (tmp_path / "run.png").exists()
+
+
+def test_an_unknown_signal_is_named_with_the_nearest_one(trace_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(trace_path), "--out", "run.png", "--signals", "duty,speed_deg"]) == 2
+    assert capsys.readouterr().err == (
+        f"plot_trace: 'speed_deg' is not a signal; allowed are {', '.join(SIGNALS)}; did you mean speed_deg_s?\n"
+    )
+
+
+def test_a_part_of_the_trace_and_of_its_signals_is_drawn(trace_path: Path) -> None:
+    figure = draw_trace(read_trace(trace_path), from_s=1.0, to_s=4.0, signals=("true_deg", "duty"))
+
+    assert [axes.get_ylabel() for axes in figure.axes] == ["position (deg)", "duty (%)"]
+    assert [axes.get_xlim() for axes in figure.axes] == [(1.0, 4.0)] * 2
+    for axes in figure.axes:
+        (curve,) = (line for line in axes.lines if line.get_label() in {"true", "duty"})
+        times = np.asarray(curve.get_xdata())
+        assert times[0] <= 1.0 < times[1]
+        assert times[-2] < 4.0 <= times[-1]
+
+
+def test_a_part_in_which_nothing_changes_is_a_line(trace_path: Path) -> None:
+    """The trace holds a stretch at rest as its first and last tick alone."""
+    figure = draw_trace(read_trace(trace_path), from_s=0.1, to_s=0.4, signals=("encoder_deg",))
+
+    (curve,) = (line for line in figure.axes[0].lines if line.get_label() == "encoder")
+    assert np.asarray(curve.get_xdata())[0] < 0.1
+    assert np.asarray(curve.get_xdata())[-1] > 0.4

@@ -1,9 +1,11 @@
+import json
 import shlex
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,12 +20,71 @@ def test_the_command_line_writes_gains_header_report_and_plots(
 
     assert status == 0
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"gains.toml", "gains.h", "report.html", "answers.svg", "bode.svg", "nyquist.svg", "spread.svg"}
+    assert names == {
+        "gains.toml",
+        "gains.h",
+        "figures.json",
+        "report.html",
+        "answers.svg",
+        "bode.svg",
+        "nyquist.svg",
+        "spread.svg",
+    }
     assert "ramp set: K " in capsys.readouterr().out
     load_config(tmp_path / "out" / "gains.toml")
     report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert report.count("<svg") == 4
     assert "src=" not in report  # nothing is fetched from elsewhere
+
+
+def judged(gains: str, folder: Path, *options: str) -> tuple[int, dict[str, Any]]:
+    """Judge gains given as TOML; return the exit status and the figures."""
+    path = folder / "gains.toml"
+    path.write_text(gains, encoding="utf-8")
+    status = main(["--judge", str(path), "--plants", "10", "--out", str(folder / "out"), *options])
+    return status, json.loads((folder / "out" / "figures.json").read_text(encoding="utf-8"))
+
+
+def test_gains_that_keep_all_bounds_are_judged_with_status_0(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, figures = judged("[gains.hold]\nproportional_duty_s_deg = 0.016\n", tmp_path, "--noise", "5")
+
+    assert status == 0
+    assert figures["all_bounds_hold"] is True
+    assert figures["sets"]["hold"]["after"]["proportional_duty_s_deg"] == pytest.approx(0.016, rel=1e-4)
+    assert all(bound["holds"] for each in figures["sets"].values() for bound in each["bounds"].values())
+    assert figures["checks"]["load_step"]["load_peak_deg_s"]["after"]["emulator"] > 0.1
+    assert "Both sets keep all bounds" in capsys.readouterr().out
+    assert load_config(tmp_path / "out" / "gains.toml").gains.hold.proportional_duty_s_deg == pytest.approx(0.016)
+
+
+def test_gains_that_break_bounds_are_reported_in_full_with_status_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wild = "[gains.ramp]\nproportional_duty_s_deg = 0.2\n[gains.hold]\nproportional_duty_s_deg = 0.004\n"
+
+    status, figures = judged(wild, tmp_path)
+
+    assert status == 1
+    assert figures["all_bounds_hold"] is False
+    assert [figures["sets"][name]["stable"] for name in ("ramp", "hold")] == [False, True]
+    assert figures["sets"]["hold"]["bounds"]["bandwidth_hz"]["holds"] is False
+    assert figures["sets"]["hold"]["bounds"]["sensitivity_peak"]["holds"] is True
+    assert figures["checks"]["ramp"]["ramp_lag_deg_s"]["after"]["model"] is None
+    report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Not all bounds hold: the ramp set is not stable; the constant-speed set breaks " in report
+    assert report.count("<svg") == 4
+    assert "Not all bounds hold" in capsys.readouterr().out
+
+
+def test_the_judged_file_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "gains.toml"
+    path.write_text("[gains.hold]\nproportional_duty_s_deg = 0.016  # mine\n", encoding="utf-8")
+
+    assert main(["--judge", str(path), "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == f"tune: {path} would be overwritten; --out must be another folder\n"
+    assert path.read_text(encoding="utf-8").endswith("# mine\n")
 
 
 @pytest.mark.parametrize(
@@ -37,6 +98,7 @@ def test_the_command_line_writes_gains_header_report_and_plots(
         (["--spread", "nan"], "--spread is nan; it must be at least 0 and less than 100 %"),
         (["--seed", "-1"], "--seed is -1; it must be at least 0"),
         (["--config", "/nowhere/table.toml"], "/nowhere/table.toml: cannot be read"),
+        (["--judge", "/nowhere/gains.toml"], "/nowhere/gains.toml: cannot be read"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(

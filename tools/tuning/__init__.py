@@ -1,1 +1,32 @@
-"""Gain tuning: linear model, margins, gain design, Monte Carlo, checks on the emulator, report."""
+"""Gain tuning: the speed loop as python-control systems, gain design within bounds, and checks on the emulator.
+
+The names below are the public interface; docs/tuning.md, "In Python", shows their use.
+"""
+
+from emulator.config.table_config import GainsConfig
+from tools.tuning.bounds import Limits
+from tools.tuning.check import Check, Curve, Figure
+from tools.tuning.checks import EmulatorChecks, check_on_emulator
+from tools.tuning.gain_files import gains_config
+from tools.tuning.linear_model import Teeth, plant, quantisation_noise
+from tools.tuning.loop import closed_loop, open_loop, registers, regulator
+from tools.tuning.loop_figures import LoopFigures
+
+__all__ = [
+    "Check",
+    "Curve",
+    "EmulatorChecks",
+    "Figure",
+    "GainsConfig",
+    "Limits",
+    "LoopFigures",
+    "Teeth",
+    "check_on_emulator",
+    "closed_loop",
+    "gains_config",
+    "open_loop",
+    "plant",
+    "quantisation_noise",
+    "registers",
+    "regulator",
+]

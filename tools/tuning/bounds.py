@@ -1,6 +1,6 @@
 """The bounds that a gain set must keep, and how far it is from each."""
 
-from math import ceil, floor, log10
+from math import ceil, floor, isinf, log10
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +30,8 @@ class Bound(NamedTuple):
 
     def shown(self, value: float) -> str:
         """Return a value of this figure with its unit."""
+        if isinf(value):
+            return "not reached"
         return f"{value * self.scale:.3g}{self.unit}"
 
     def allowing(self, value: float) -> float:

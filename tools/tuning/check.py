@@ -18,8 +18,9 @@ class Curve(NamedTuple):
 
 
 class Figure(NamedTuple):
-    """One figure of merit, the less the better."""
+    """One figure of merit, the less the better. The key names it in programs, the title in reports."""
 
+    key: str
     title: str
     unit: str
     emulator: float
@@ -27,9 +28,10 @@ class Figure(NamedTuple):
 
 
 class Check(NamedTuple):
-    """A run and what it shows."""
+    """A run and what it shows. The key names it in programs, the title in reports."""
 
-    name: str
+    key: str
+    title: str
     ordinate: str
     curve: Curve
     figures: tuple[Figure, ...]

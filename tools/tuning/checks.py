@@ -4,9 +4,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
-from emulator.config.table_config import TableConfig
+from emulator.config.table_config import GainsConfig, TableConfig
+from tools.emulated import with_gains
 from tools.tuning.check import Check, Figure
 from tools.tuning.linear_checks import load_step, ramp, step
+from tools.tuning.loop import registers
 from tools.tuning.noise_check import noise
 from tools.tuning.nonlinear_checks import creep, reversal, small_moves
 
@@ -24,11 +26,38 @@ _CHECKS: tuple[Callable[[TableConfig, int], Check], ...] = (
 )
 
 
+class EmulatorChecks(NamedTuple):
+    """Runs of one table with its gain sets, and all their figures, by key."""
+
+    runs: dict[str, Check]
+    figures: dict[str, Figure]
+
+
 class Difference(NamedTuple):
     """A figure in which emulator and model differ, and what it is on the emulator without some of its effects."""
 
     figure: Figure
     without: dict[str, float]
+
+
+def check_on_emulator(config: TableConfig, ramp: GainsConfig, hold: GainsConfig, seed: int = 0) -> EmulatorChecks:
+    """Run all checks of a table with own gain sets; takes seconds.
+
+    Args:
+        config: The table.
+        ramp: Gain set for ramps, in engineering units.
+        hold: Gain set for a constant speed.
+        seed: Decides where the shaft stands between two counts, and the teeth within the backlash.
+
+    Raises:
+        ConfigError: As `loop.registers`.
+    """
+    for gains in (ramp, hold):
+        registers(config, gains)
+    checks = all_checks(with_gains(config, ramp, hold), seed)
+    return EmulatorChecks(
+        {check.key: check for check in checks}, {figure.key: figure for check in checks for figure in check.figures}
+    )
 
 
 def all_checks(config: TableConfig, seed: int) -> list[Check]:

@@ -33,7 +33,7 @@ _BATCH = 1 << 20
 
 
 class Design(NamedTuple):
-    """The outcome of a search."""
+    """A gain set with its figures and bounds: the outcome of a search, or given."""
 
     gains: Gains
     figures: LoopFigures  # of this one gain set, arrays of shape (1,)
@@ -41,8 +41,10 @@ class Design(NamedTuple):
 
     @property
     def broken(self) -> tuple[Bound, ...]:
-        """The bounds that even the best gains break."""
-        return tuple(bound for bound in self.bounds if bound.excess(self.figures)[0] > 0.0)
+        """The bounds that the gains break; a loop that is not stable breaks all."""
+        if not self.figures.stable[0]:
+            return self.bounds
+        return tuple(bound for bound in self.bounds if not bound.excess(self.figures)[0] <= 0.0)  # NaN keeps none
 
     def stated(self, bound: Bound) -> str:
         """Return a bound with what these gains reach, in words."""

@@ -9,7 +9,7 @@ quantisation of speed and PWM as two noises (`quantisation_noise`), and the back
 """
 
 from enum import StrEnum
-from math import degrees, sqrt
+from math import degrees, radians, sqrt
 
 import control
 import numpy as np
@@ -21,16 +21,16 @@ from emulator.firmware.pid import Gains
 
 Array = NDArray[np.float64]
 
-INTEGRAL_STATE = -3
-"""Where the regulator's integral stands in the state of `closed_loop`."""
-
 
 class Teeth(StrEnum):
-    """What the motor turns, by the state of the backlash (`emulator.plant.drive_train`)."""
+    """State of the backlash, which decides what the motor turns (`emulator.plant.drive_train`)."""
 
-    DRIVING = "engaged, driving"
-    OVERHAULING = "engaged, overhauling"
+    DRIVING = "driving"
+    """The teeth touch, and the motor drives the table."""
+    OVERHAULING = "overhauling"
+    """The teeth touch, and the table drives the motor."""
     FREE = "free"
+    """The teeth do not touch: the motor turns without the table."""
 
 
 def load_ratio(config: TableConfig, teeth: Teeth) -> float:
@@ -55,27 +55,46 @@ def motor_system(config: TableConfig, teeth: Teeth) -> tuple[Array, Array]:
     return a, np.array([[1.0 / l, 0.0], [0.0, -1.0 / j], [0.0, 0.0]])
 
 
-def plant(config: TableConfig, teeth: Teeth) -> control.StateSpace:
-    """Return the sampled plant from duty and load to true and measured speed.
-
-    Inputs: `duty` on the bridge (1 is full), `load_Nm` against positive rotation at the table. Outputs: `speed_deg_s`
-    of the motor as the table would turn with it, `measured_deg_s`, its mean over the window. States: current, speed,
-    and the angle made in each of the last W ticks; as these are kept, and no angle, nothing integrates without end.
-    """
-    tick_s, window = 1.0 / config.control.tick_hz, config.control.speed_window_ticks
+def held_motor(config: TableConfig, teeth: Teeth) -> control.StateSpace:
+    """Return the motor over one tick, its voltage and torque held: current, speed and angle."""
     motor = control.ss(*motor_system(config, teeth), np.eye(3), np.zeros((3, 2)))
-    held = control.sample_system(motor, tick_s, method="zoh")
-    inputs = np.diag([config.driver.supply_V, load_ratio(config, teeth)])
-    size = 2 + window
-    a, b = np.zeros((size, size)), np.zeros((size, 2))
-    a[:3, :2], b[:3] = held.A[:, :2], held.B @ inputs  # the third row is the angle made in this tick
-    a[3:, 2:-1] = np.eye(window - 1)
+    return control.sample_system(motor, 1.0 / config.control.tick_hz, method="zoh")
+
+
+def plant(config: TableConfig, teeth: Teeth) -> control.StateSpace:
+    """Return the sampled plant, as the controller sees it.
+
+    Inputs: `duty`, which the controller computes in this tick (1 is full; it acts a tick later), `load_Nm`, a torque at
+    the table against positive rotation, and `encoder_error_deg`, which is added to the position that is read. Outputs:
+    `speed_deg_s` of the motor, divided by the gear ratio, and `measured_deg_s`, the encoder's mean over the window.
+    States: current, speed, the angle made in each of the last W ticks, and the duty in the PWM's buffer. No state holds
+    the position itself, so the plant has no integrator.
+    """
+    teeth = Teeth(teeth)
+    tick_s, window = 1.0 / config.control.tick_hz, config.control.speed_window_ticks
+    held = held_motor(config, teeth)
+    size = 3 + window
+    a, b = np.zeros((size, size)), np.zeros((size, 3))
+    a[:3, :2], a[:3, -1] = held.A[:, :2], held.B[:, 0] * config.driver.supply_V
+    b[:3, 1] = held.B[:, 1] * load_ratio(config, teeth)  # the third row is the angle made in this tick
+    a[3:-1, 2:-2] = np.eye(window - 1)
+    b[-1, 0] = 1.0
+    # Of the reading's errors e(k) .. e(k-W+1) all but the first and the last cancel in the sum over the window.
+    b[2:-1, 2] = radians(config.gears.ratio) * np.array([-1.0, 1.0, *[0.0] * window])[:window]
     table_deg = degrees(1.0 / config.gears.ratio)
-    c = np.zeros((2, size))
+    c, d = np.zeros((2, size)), np.zeros((2, 3))
     c[0, 1] = table_deg
-    c[1, 2:] = table_deg / (window * tick_s)
+    c[1, 2:-1] = table_deg / (window * tick_s)
+    d[1, 2] = 1.0 / (window * tick_s)
     return control.ss(
-        a, b, c, np.zeros((2, 2)), tick_s, inputs=["duty", "load_Nm"], outputs=["speed_deg_s", "measured_deg_s"]
+        a,
+        b,
+        c,
+        d,
+        tick_s,
+        inputs=["duty", "load_Nm", "encoder_error_deg"],
+        outputs=["speed_deg_s", "measured_deg_s"],
+        name=f"plant_{teeth}",
     )
 
 
@@ -95,30 +114,6 @@ def duty_gains(config: TableConfig, gains: Gains | Array) -> Array:
 def speed_quantum_deg_s(config: TableConfig) -> float:
     """Return the speed of one count a window."""
     return 1.0 / config.counts_per_deg * config.control.tick_hz / config.control.speed_window_ticks
-
-
-def regulator(config: TableConfig, gains: Gains) -> control.StateSpace:
-    """Return the PID with the PWM's buffer behind it: inputs `reference_deg_s`, `measured_deg_s`, output `duty`."""
-    proportional, integral, derivative = duty_gains(config, gains)
-    direct = proportional + integral
-    return control.ss(  # states: integral, last measured speed, duty in the buffer
-        [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.0, derivative, 0.0]],
-        [[integral, -integral], [0.0, 1.0], [direct, -direct - derivative]],
-        [[0.0, 0.0, 1.0]],
-        [[0.0, 0.0]],
-        1.0 / config.control.tick_hz,
-        inputs=["reference_deg_s", "measured_deg_s"],
-        outputs=["duty"],
-    )
-
-
-def closed_loop(config: TableConfig, teeth: Teeth, gains: Gains) -> control.StateSpace:
-    """Return the closed loop: inputs `reference_deg_s`, `load_Nm`; outputs `speed_deg_s`, `measured_deg_s`, `duty`."""
-    return control.interconnect(
-        [plant(config, teeth), regulator(config, gains)],
-        inputs=["reference_deg_s", "load_Nm"],
-        outputs=["speed_deg_s", "measured_deg_s", "duty"],
-    )
 
 
 def quantisation_noise(config: TableConfig) -> tuple[float, float]:

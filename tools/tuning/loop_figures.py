@@ -77,7 +77,7 @@ def loop_figures(loops: Loops, registers: Array) -> LoopFigures:
     rejection = plant.speed_by_load - plant.speed_by_duty * regulator.by_measured * sensitivity * plant.measured_by_load
     speed, lost = step_answer(tracking, 1.0), step_answer(rejection, 0.0)
     load_peak = -lost.min(axis=-1)
-    settling = np.maximum(_settling_ticks(speed - 1.0, 1.0), _settling_ticks(lost, load_peak[..., None]))
+    settling = np.maximum(settling_ticks(speed - 1.0, 1.0), settling_ticks(lost, load_peak[..., None]))
     return LoopFigures(
         stable=np.all([state.stable for state in per_state], axis=0),
         sensitivity_peak=np.max([state.sensitivity_peak for state in per_state], axis=0),
@@ -123,7 +123,7 @@ def _bandwidth_hz(tracking: Complex, frequency_hz: Array) -> Array:
     return result
 
 
-def _settling_ticks(deviation: Array, height: Array | float) -> Array:
+def settling_ticks(deviation: Array, height: Array | float) -> Array:
     """Return the last tick at which the deviation is outside a tenth of the height."""
     outside = np.abs(deviation) > SETTLED_SHARE * height
     result: Array = np.where(outside.any(axis=-1), outside.shape[-1] - 1 - np.argmax(outside[..., ::-1], axis=-1), 0)

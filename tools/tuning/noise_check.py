@@ -26,12 +26,25 @@ def noise(config: TableConfig, seed: int) -> Check:
     time_s, duty, steady = _steady(config, speed, seed)
     swept = _on_ramp(config, seed)
     return Check(
+        "noise",
         f"noise at {speed:.4g} deg/s",
-        "duty, %",
+        "duty (%)",
         Curve(time_s, duty, None),
         (
-            Figure(f"noise at the PWM at {speed:.4g} deg/s", "% duty", steady, 100.0 * float(hold.noise_duty[0])),
-            Figure("noise at the PWM on a ramp", "% duty", swept, 100.0 * float(ramp.ramp_noise_duty[0])),
+            Figure(
+                "noise_duty_percent",
+                f"noise at the PWM at {speed:.4g} deg/s",
+                "% duty",
+                steady,
+                100.0 * float(hold.noise_duty[0]),
+            ),
+            Figure(
+                "ramp_noise_duty_percent",
+                "noise at the PWM on a ramp",
+                "% duty",
+                swept,
+                100.0 * float(ramp.ramp_noise_duty[0]),
+            ),
         ),
     )
 

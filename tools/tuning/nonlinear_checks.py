@@ -27,12 +27,13 @@ def small_moves(config: TableConfig, seed: int) -> Check:
     misses = np.abs(answer.encoder_deg[ends] - targets)
     arrival_s = _arrival_s(answer, [motion.time_s for motion in motions], pause_s)
     return Check(
+        "small_moves",
         "small moves",
-        "encoder, deg",
+        "encoder (deg)",
         Curve(answer.time_s, answer.encoder_deg, None),
         (
-            Figure("greatest distance from the target at rest", "deg", float(misses.max()), None),
-            Figure(f"longest move of up to {longest_deg:g} deg", "s", arrival_s, None),
+            Figure("rest_error_deg", "greatest distance from the target at rest", "deg", float(misses.max()), None),
+            Figure("move_time_s", f"longest move of up to {longest_deg:g} deg", "s", arrival_s, None),
         ),
     )
 
@@ -46,10 +47,19 @@ def reversal(config: TableConfig, seed: int) -> Check:
     error = answer.reference_deg - answer.encoder_deg
     window = answer.time_s > at_s - 0.1
     return Check(
+        "reversal",
         "reversal through the backlash",
-        "encoder behind, deg",
+        "encoder behind (deg)",
         Curve(answer.time_s[window], error[window], None),
-        (Figure("most that the encoder is behind in a reversal", "deg", float(np.abs(error[window]).max()), None),),
+        (
+            Figure(
+                "reversal_lag_deg",
+                "most that the encoder is behind in a reversal",
+                "deg",
+                float(np.abs(error[window]).max()),
+                None,
+            ),
+        ),
     )
 
 
@@ -62,10 +72,11 @@ def creep(config: TableConfig, seed: int) -> Check:
     moving = np.flatnonzero(answer.true_deg - answer.true_deg[0] > speed * _SETTLED_CREEP_S)
     ripple = float(answer.true_speed_deg_s[moving[0] :].std()) if len(moving) else float("inf")
     return Check(
+        "creep",
         f"creeping at {speed:.3g} deg/s",
-        "speed of the table, deg/s",
+        "speed of the table (deg/s)",
         Curve(answer.time_s, answer.true_speed_deg_s, None),
-        (Figure("ripple of the speed at creep", "deg/s", ripple, None),),
+        (Figure("creep_ripple_deg_s", "ripple of the speed at creep", "deg/s", ripple, None),),
     )
 
 

@@ -13,14 +13,27 @@ from tools.tuning.frequency_response import Complex
 from tools.tuning.linear_model import Teeth, duty_gains
 from tools.tuning.loop_figures import Loops
 from tools.tuning.margins import controller
-from tools.tuning.tuned_table import Tuning
+from tools.tuning.tuned_table import Tuning, Words
 
+_CREEP_S = 0.25
+"""Time that is drawn of the creep: a longer one is a band in which no curve can be seen."""
 _PLOT_GRID = 4096
+_TITLES = {
+    Teeth.DRIVING: "motor drives table",
+    Teeth.OVERHAULING: "table drives motor",
+    Teeth.FREE: "free in the backlash",
+}
 _LINES: dict[Teeth, Any] = {  # told apart without colour too, and where one lies upon the other
     Teeth.DRIVING: {"color": BLUE, "linewidth": 2.4},
     Teeth.OVERHAULING: {"color": GREEN, "linestyle": "--"},
     Teeth.FREE: {"color": ORANGE, "linestyle": ":", "linewidth": 2.0},
 }
+
+
+# Told apart without colour too, and apart for color-blind readers (Okabe and Ito).
+_AFTER: Any = {"color": "#0072b2", "linewidth": 1.6}
+_BEFORE: Any = {"color": "#d55e00", "linewidth": 1.1, "linestyle": (0, (5, 2))}
+_MODEL: Any = {"color": "black", "linewidth": 1.3, "linestyle": (0, (1, 1.6))}
 
 
 def plots(tuning: Tuning) -> dict[str, str]:
@@ -33,30 +46,28 @@ def plots(tuning: Tuning) -> dict[str, str]:
 def _answers(tuning: Tuning) -> Drawing:
     drawing = new_figure(10.5, 11.2, rows=(len(tuning.checks) + 1) // 2, columns=2)
     for axes, (before, after) in zip(drawing.axes, tuning.checks, strict=False):
-        _draw_check(axes, before, after)
+        _draw_check(axes, before, after, tuning.words)
     for axes in drawing.axes[len(tuning.checks) :]:
         axes.set_visible(False)
-    drawing.legend(*drawing.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    curves = {
+        label: line for axes in drawing.axes for line, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    drawing.legend(list(curves.values()), list(curves), loc="outside upper center", ncols=3, handlelength=3.5)
     return drawing
 
 
-def _draw_check(axes: Axes, before: Check, after: Check) -> None:
-    axes.plot(before.curve.time_s, before.curve.emulator, color=GREY, linewidth=1.0, label="emulator, former gains")
-    axes.plot(after.curve.time_s, after.curve.emulator, color=BLUE, linewidth=1.2, label="emulator, tuned gains")
+def _draw_check(axes: Axes, before: Check, after: Check, words: Words) -> None:
+    for check, word, style in ((after, words.after, _AFTER), (before, words.before, _BEFORE)):
+        axes.plot(check.curve.time_s, check.curve.emulator, **style, label=f"emulator, {word} gains")
     if after.curve.model is not None:
-        axes.plot(
-            after.curve.time_s,
-            after.curve.model,
-            color=ORANGE,
-            linewidth=1.3,
-            linestyle="--",
-            label="model, tuned gains",
-        )
-    axes.set_title(after.name)
+        axes.plot(after.curve.time_s, after.curve.model, **_MODEL, label=f"linear model, {words.after} gains")
+    axes.set_title(after.title)
     axes.set_ylabel(after.ordinate)
-    axes.set_xlabel("time, s")
-    if "step" in after.name:
+    axes.set_xlabel("time (s)")
+    if after.key in ("step", "load_step"):
         axes.set_xlim(-0.02, 0.15)
+    if after.key == "creep":
+        axes.set_xlim(after.curve.time_s[-1] - _CREEP_S, after.curve.time_s[-1])
 
 
 def _loops(tuning: Tuning, gains: Gains) -> tuple[Loops, dict[Teeth, Complex]]:
@@ -73,12 +84,12 @@ def _bode(tuning: Tuning) -> Drawing:
         size, phase = drawing.axes[column], drawing.axes[column + 2]
         seen = loops.frequency_hz < control.tick_hz / control.speed_window_ticks  # where the window has its first zero
         for teeth, response in responses.items():
-            size.semilogx(loops.frequency_hz, 20.0 * np.log10(np.abs(response)), **_LINES[teeth], label=str(teeth))
+            size.semilogx(loops.frequency_hz, 20.0 * np.log10(np.abs(response)), **_LINES[teeth], label=_TITLES[teeth])
             phase.semilogx(loops.frequency_hz[seen], np.degrees(np.unwrap(np.angle(response[seen]))), **_LINES[teeth])
         size.axhline(0.0, color=GREY, linewidth=0.8)
         phase.axhline(-180.0, color=GREY, linewidth=0.8)
-        size.set(title=tuned.title, ylabel="gain, dB", ylim=(-40, 40))
-        phase.set(ylabel="phase, deg", xlabel="frequency, Hz", ylim=(-360, 0), xlim=size.get_xlim())
+        size.set(title=tuned.title, ylabel="gain (dB)", ylim=(-40, 40))
+        phase.set(ylabel="phase (deg)", xlabel="frequency (Hz)", ylim=(-360, 0), xlim=size.get_xlim())
         size.legend(loc="lower left")
     return drawing
 
@@ -89,7 +100,7 @@ def _nyquist(tuning: Tuning) -> Drawing:
     for axes, tuned in zip(drawing.axes, tuning.sets.values(), strict=True):
         _, responses = _loops(tuning, tuned.design.gains)
         for teeth, response in responses.items():
-            axes.plot(response.real, response.imag, **_LINES[teeth], label=str(teeth))
+            axes.plot(response.real, response.imag, **_LINES[teeth], label=_TITLES[teeth])
         limit = next(bound.limit for bound in tuned.design.bounds if bound.figure == "sensitivity_peak")
         circle = -1.0 + turn / limit
         axes.fill(circle.real, circle.imag, color=RED, alpha=0.12, linewidth=0)

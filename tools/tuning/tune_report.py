@@ -8,9 +8,10 @@ from tools.tuning.bounds import Bound
 from tools.tuning.check import Figure
 from tools.tuning.checks import differs
 from tools.tuning.comparison_report import textbook_table, trade_table
+from tools.tuning.gain_design import Design
 from tools.tuning.linear_model import duty_gains, quantisation_noise, speed_quantum_deg_s
 from tools.tuning.loop_figures import LoopFigures
-from tools.tuning.tuned_table import TunedSet, Tuning
+from tools.tuning.tuned_table import JUDGED, TunedSet, Tuning, Words
 from tools.tuning.way_out import changes
 
 _SAME_SHARE = 0.05
@@ -39,25 +40,30 @@ def _summary(tuning: Tuning) -> str:
     figures = [pair for before, after in tuning.checks for pair in zip(before.figures, after.figures, strict=True)]
     better = sum(not _is_worse(old, new) for old, new in figures)
     return (
-        f"{_verdict(tuning)} On the emulator {better} of {len(figures)} figures are "
-        f"as good as before, within {100 * _SAME_SHARE:.0f} %, or better."
+        f"{verdict(tuning)} On the emulator {better} of {len(figures)} figures are as good as with the "
+        f"{tuning.words.before} gains, within {100 * _SAME_SHARE:.0f} %, or better."
     )
 
 
-def _verdict(tuning: Tuning) -> str:
+def verdict(tuning: Tuning) -> str:
+    """Return in a sentence whether the bounds hold: which are binding, or which are broken and by what."""
     if tuning.feasible:
         parts = [f"{tuned.title}: bounded by {_names(tuned.design.binding)}" for tuned in tuning.sets.values()]
         return f"Both sets keep all bounds ({'; '.join(parts)})."
-    parts = [
-        f"the {tuned.title} breaks {', '.join(map(tuned.design.stated, tuned.design.broken))}"
-        for tuned in tuning.sets.values()
-        if tuned.design.broken
-    ]
+    parts = [f"the {tuned.title} {_broken(tuned.design)}" for tuned in tuning.sets.values() if tuned.design.broken]
+    if tuning.words == JUDGED:
+        return f"Not all bounds hold: {'; '.join(parts)}."
     way = ""
     if tuning.eased is not None:
         options = " ".join(after.option for _, after in changes(tuning.limits, tuning.eased))
         way = f" With {options} both sets keep all bounds."
     return f"No gains keep all bounds: {'; '.join(parts)}.{way} This report judges the nearest gains."
+
+
+def _broken(design: Design) -> str:
+    if not design.figures.stable[0]:
+        return "is not stable"
+    return f"breaks {', '.join(map(design.stated, design.broken))}"
 
 
 def _gains_section(tuning: Tuning) -> list[str]:
@@ -75,7 +81,9 @@ def _linear_section(tuning: Tuning) -> list[str]:
         ),
     ]
     for tuned in tuning.sets.values():
-        blocks += [_figures_table(tuned), paragraph(f"Binding for the {tuned.title}: {_names(tuned.design.binding)}.")]
+        blocks.append(_figures_table(tuned, tuning.words))
+        if not tuned.design.broken:
+            blocks.append(paragraph(f"Binding for the {tuned.title}: {_names(tuned.design.binding)}."))
     return blocks
 
 
@@ -107,7 +115,8 @@ def _emulator_section(tuning: Tuning, drawings: dict[str, str]) -> list[str]:
         *[paragraph(text) for text in _differences(tuning)],
         figure_block(
             drawings["answers"],
-            "Answers in time: tuned and former gains on the emulator, and the linear model with the tuned gains.",
+            f"Answers in time: {tuning.words.after} gains (solid) and {tuning.words.before} gains (dashed) on the "
+            f"emulator, and the linear model with the {tuning.words.after} gains (dotted) where its loop is stable.",
         ),
     ]
 
@@ -142,7 +151,7 @@ def _spread_section(tuning: Tuning, drawings: dict[str, str]) -> list[str]:
 def _gains_table(tuning: Tuning) -> str:
     rows: list[tuple[str, ...]] = []
     for tuned in tuning.sets.values():
-        for when, gains in (("before", tuned.before), ("tuned", tuned.design.gains)):
+        for when, gains in zip(tuning.words, (tuned.before, tuned.design.gains), strict=True):
             rows.append((f"{tuned.title}, {when}", *_gain_cells(tuning, gains)))
     head = ("", "K, duty s/deg", "Ti, ms", "Td, ms", "proportional", "integral", "derivative")
     return table_block(head, rows)
@@ -155,10 +164,11 @@ def _gain_cells(tuning: Tuning, gains: Gains) -> tuple[str, ...]:
     return (f"{proportional:.5f}", *(f"{time:.3f}" for time in times), *map(str, gains))
 
 
-def _figures_table(tuned: TunedSet) -> str:
+def _figures_table(tuned: TunedSet, words: Words) -> str:
     rows: list[tuple[str, ...]] = []
     for bound in tuned.design.bounds:
-        after = _judged(bound, tuned.design.figures) + (" (binding)" if bound in tuned.design.binding else "")
+        binding = bound in tuned.design.binding and bound not in tuned.design.broken
+        after = _judged(bound, tuned.design.figures) + (" (binding)" if binding else "")
         rows.append((bound.title, _limit(bound), _judged(bound, tuned.before_figures), after))
     bounded = {bound.figure for bound in tuned.design.bounds}
     for title, field, scale, unit in (
@@ -171,11 +181,11 @@ def _figures_table(tuned: TunedSet) -> str:
         if field in bounded:
             continue
         values = [
-            f"{float(getattr(figures, field)[0]) * scale:.3g}{unit}"
+            f"{float(getattr(figures, field)[0]) * scale:.3g}{unit}" if figures.stable[0] else ""
             for figures in (tuned.before_figures, tuned.design.figures)
         ]
         rows.append((title, "", *values))
-    return table_block((tuned.title, "bound", "before", "tuned"), rows)
+    return table_block((tuned.title, "bound", *words), rows)
 
 
 def _limit(bound: Bound) -> str:
@@ -183,6 +193,8 @@ def _limit(bound: Bound) -> str:
 
 
 def _judged(bound: Bound, figures: LoopFigures) -> str:
+    if not figures.stable[0]:
+        return "!not stable"
     value = bound.shown(float(getattr(figures, bound.figure)[0]))
     return value if bound.excess(figures)[0] <= 0.0 else f"!{value}"
 
@@ -206,7 +218,7 @@ def _checks_table(tuning: Tuning) -> str:
                     _difference(new),
                 )
             )
-    return table_block(("figure", "before", "tuned", "model", "emulator to model"), rows)
+    return table_block(("figure", *tuning.words, "model", "emulator to model"), rows)
 
 
 def _is_worse(old: Figure, new: Figure) -> bool:

@@ -4,10 +4,11 @@ from collections.abc import Callable
 from math import ceil, log2
 from typing import NamedTuple
 
+import control
 import numpy as np
 
 from emulator.config.constants import fixed_gains
-from emulator.config.table_config import TableConfig
+from emulator.config.table_config import GainSetsConfig, TableConfig
 from emulator.firmware.pid import Gains
 from tools.emulated import with_gains
 from tools.tuning.bounds import Limits
@@ -15,7 +16,9 @@ from tools.tuning.check import Check
 from tools.tuning.checks import Difference, all_checks, differences
 from tools.tuning.gain_design import Design, Scan, scan
 from tools.tuning.gain_files import gains_config
-from tools.tuning.loop_figures import LoopFigures, Loops, loop_figures
+from tools.tuning.linear_model import Teeth
+from tools.tuning.loop import closed_loop, is_stable, registers
+from tools.tuning.loop_figures import LoopFigures, Loops, loop_figures, settling_ticks
 from tools.tuning.monte_carlo import Outcome, monte_carlo, spread_tables
 from tools.tuning.trade_off import Trade, textbook_designs, trade_off
 from tools.tuning.way_out import SetDesigns, both_designs, changes, eased_limits, proved
@@ -37,8 +40,18 @@ class TunedSet(NamedTuple):
     spread: Outcome
 
 
+class Words(NamedTuple):
+    """What reports call the two gain sets that they compare."""
+
+    before: str
+    after: str
+
+
+TUNED, JUDGED = Words("former", "tuned"), Words("configured", "given")
+
+
 class Tuning(NamedTuple):
-    """The outcome."""
+    """The outcome, of a search for gains or of gains that were given."""
 
     before: TableConfig
     after: TableConfig
@@ -51,6 +64,7 @@ class Tuning(NamedTuple):
     textbook: dict[str, Design]
     plants: int
     spread: float
+    words: Words
 
     @property
     def feasible(self) -> bool:
@@ -79,15 +93,31 @@ def tune(
     if not designs.stable:
         raise TuningError("no gains make the speed loop stable; shorten control.speed_window_ticks or the tick")
     eased = _eased(scanned, limits, designs) if designs.broken else None
-    ramp, hold = designs
     progress(0.3)
+    return examined(scanned, limits, eased, (designs.ramp, designs.hold), plants, spread, seed, progress, TUNED)
+
+
+def examined(
+    scanned: Scan,
+    limits: Limits,
+    eased: Limits | None,
+    designs: tuple[Design, Design],
+    plants: int,
+    spread: float,
+    seed: int,
+    progress: Callable[[float], None],
+    words: Words,
+) -> Tuning:
+    """Return how the gain sets of two designs do on a table, beside those of its configuration."""
+    loops, (ramp, hold) = scanned.loops, designs
+    config = loops.config
     after = with_gains(config, gains_config(config, ramp.gains), gains_config(config, hold.gains))
     # Half as fine as for the design: no loop within the bounds needs more.
     tables = spread_tables(config, plants, spread, seed)
-    outcomes = monte_carlo(tables, (ramp, hold), size // 2, lambda share: progress(0.3 + 0.2 * share))
+    outcomes = monte_carlo(tables, designs, len(loops.z), lambda share: progress(0.3 + 0.2 * share))
     before = [fixed_gains(config, gains) for gains in (config.gains.ramp, config.gains.hold)]
     sets = {
-        name: TunedSet(title, former, loop_figures(loops, np.array([former])), designed, outcome)
+        name: TunedSet(title, former, settled_figures(loops, former), designed, outcome)
         for name, title, former, designed, outcome in zip(
             ("ramp", "hold"), ("ramp set", "constant-speed set"), before, (ramp, hold), outcomes, strict=True
         )
@@ -102,7 +132,55 @@ def tune(
     trades, textbook = trade_off(scanned, limits, seed), textbook_designs(scanned, limits)
     progress(1.0)
     pairs = tuple(zip(checks_before, checks_after, strict=True))
-    return Tuning(config, after, sets, pairs, explained, limits, eased, trades, textbook, plants, spread)
+    return Tuning(config, after, sets, pairs, explained, limits, eased, trades, textbook, plants, spread, words)
+
+
+def judge(
+    config: TableConfig,
+    gains: GainSetsConfig,
+    limits: Limits,
+    plants: int,
+    spread: float,
+    seed: int,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Tuning:
+    """Return how given gain sets do on a table, within the limits or not, beside those of its configuration.
+
+    Raises:
+        ConfigError: The firmware cannot hold the gains.
+    """
+    loops = Loops.of([config], grid_size(config, limits))
+    scanned, designs = scan(loops), []
+    for given, bounds in ((gains.ramp, limits.for_ramp()), (gains.hold, limits.for_hold())):
+        held = registers(config, given)
+        designs.append(Design(held, settled_figures(loops, held), bounds))
+    return examined(scanned, limits, None, (designs[0], designs[1]), plants, spread, seed, progress, JUDGED)
+
+
+def settled_figures(loops: Loops, gains: Gains) -> LoopFigures:
+    """Return the figures of any one gain set, however slow or unstable, of the one table of the loops.
+
+    `loop_figures` takes the answers in time from the grid of frequencies, which holds no answer longer than the grid.
+    """
+    figures = loop_figures(loops, np.array([gains]))
+    states = {teeth: closed_loop(loops.config, teeth, gains) for teeth in Teeth}
+    if not all(map(is_stable, states.values())):
+        return figures._replace(stable=np.array([False]))
+    ticks = np.arange(2 * len(loops.z)) / loops.config.control.tick_hz
+    speed, lost = (
+        control.step_response(states[Teeth.DRIVING]["speed_deg_s", source], ticks).outputs
+        for source in ("reference_deg_s", "load_Nm")
+    )
+    peak = max(-float(lost.min()), 0.0)
+    settling = float(max(settling_ticks(speed - 1.0, 1.0), settling_ticks(lost, peak)))
+    if settling == len(ticks) - 1:
+        settling = np.inf  # still outside at the end
+    return figures._replace(
+        stable=np.array([True]),
+        overshoot=np.array([max(float(speed.max()) - 1.0, 0.0)]),
+        settling_s=np.array([settling / loops.config.control.tick_hz]),
+        load_peak_deg_s_Nm=np.array([peak]),
+    )
 
 
 def grid_size(config: TableConfig, limits: Limits) -> int:

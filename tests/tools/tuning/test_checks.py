@@ -15,14 +15,14 @@ FIGURES = [figure for check in CHECKS for figure in check.figures]
 
 
 @pytest.mark.parametrize(
-    "figure", [figure for figure in FIGURES if figure.model is not None], ids=lambda each: each.title
+    "figure", [figure for figure in FIGURES if figure.model is not None], ids=lambda each: each.key
 )
 def test_the_emulator_does_what_the_linear_model_foretells(figure: Figure) -> None:
     assert figure.emulator == pytest.approx(figure.model, rel=0.2)
 
 
 def test_small_moves_of_the_default_table_end_near_their_target() -> None:
-    (miss,) = (figure for figure in FIGURES if figure.title.startswith("greatest distance"))
+    (miss,) = (figure for figure in FIGURES if figure.key == "rest_error_deg")
     assert miss.emulator < 0.05
 
 
@@ -72,12 +72,12 @@ def test_the_ripple_at_creep_is_that_of_a_moving_table_however_wide_the_gap(seed
 
 def test_a_difference_is_shown_without_what_the_model_lacks() -> None:
     gap = replace(CONFIG, gears=replace(CONFIG.gears, backlash_arcmin=300.0))
-    checks = [run if run.name != "ramp" else _with_wrong_model(run) for run in all_checks(gap, seed=1)]
+    checks = [run if run.key != "ramp" else _with_wrong_model(run) for run in all_checks(gap, seed=1)]
 
     found = differences(gap, 1, checks)
 
     assert {each.figure for each in found} == {figure for run in checks for figure in run.figures if differs(figure)}
-    lag = next(each for each in found if each.figure.title.startswith("speed lag"))
+    lag = next(each for each in found if each.figure.key == "ramp_lag_deg_s")
     assert set(lag.without) == {"stiction", "backlash", "both"}
     assert lag.without["stiction"] != lag.without["backlash"]
 

@@ -10,7 +10,8 @@ from emulator.config.table_config import TableConfig, load_config
 from emulator.plant import drive_train
 from tools.emulated import Array
 from tools.tuning.frequency_response import grid_z, plant_response
-from tools.tuning.linear_model import Teeth, closed_loop, duty_gains, plant, regulator, speed_gain_deg_s
+from tools.tuning.linear_model import Teeth, duty_gains, plant, speed_gain_deg_s
+from tools.tuning.loop import closed_loop
 
 CONFIG = load_config()
 
@@ -60,7 +61,7 @@ def test_the_step_answer_is_the_emulators_without_friction_backlash_and_quantisa
     model = control.forced_response(
         closed_loop(config, teeth, fixed_gains(config, config.gains.hold)),
         ticks / config.control.tick_hz,
-        np.vstack([reference, load]),
+        np.vstack([reference, load, np.zeros_like(load)]),
     )
 
     assert_allclose(model.outputs[0], emulated_answer(config, reference, load), atol=1e-6)
@@ -75,8 +76,8 @@ def test_a_stack_of_plants_has_the_responses_of_each_plant_alone(teeth: Teeth) -
 
     for row, config in enumerate((CONFIG, heavy)):
         alone = plant(config, teeth)(z)
-        assert_allclose(stacked.speed_by_duty[row], alone[0, 0] / z, rtol=1e-9)
-        assert_allclose(stacked.measured_by_duty[row], alone[1, 0] / z, rtol=1e-9, atol=1e-9)
+        assert_allclose(stacked.speed_by_duty[row], alone[0, 0], rtol=1e-9)
+        assert_allclose(stacked.measured_by_duty[row], alone[1, 0], rtol=1e-9, atol=1e-9)
         assert_allclose(stacked.speed_by_load[row], alone[0, 1], rtol=1e-9, atol=1e-12)
         assert_allclose(stacked.measured_by_load[row], alone[1, 1], rtol=1e-9, atol=1e-9)
 
@@ -84,14 +85,3 @@ def test_a_stack_of_plants_has_the_responses_of_each_plant_alone(teeth: Teeth) -
 def test_at_full_duty_the_table_runs_at_the_plants_gain() -> None:
     assert control.dcgain(plant(CONFIG, Teeth.DRIVING))[0, 0] == pytest.approx(speed_gain_deg_s(CONFIG))
     assert speed_gain_deg_s(CONFIG) == pytest.approx(61.0, abs=0.1)  # the no-load speed of the datasheet, geared down
-
-
-def test_the_regulator_delays_its_duty_by_one_tick() -> None:
-    gains = fixed_gains(CONFIG, CONFIG.gains.ramp)
-    proportional, integral, _ = duty_gains(CONFIG, gains)
-
-    answer = control.forced_response(
-        regulator(CONFIG, gains), np.arange(4) / CONFIG.control.tick_hz, np.vstack([np.ones(4), np.zeros(4)])
-    )
-
-    assert_allclose(answer.outputs[0], [0.0, *(proportional + integral * np.arange(1, 4))])

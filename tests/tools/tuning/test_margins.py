@@ -7,7 +7,8 @@ from emulator.config.constants import fixed_gains
 from emulator.config.table_config import load_config
 from emulator.firmware.pid import Gains
 from tools.tuning.frequency_response import PlantResponse, grid_hz, grid_z, plant_response
-from tools.tuning.linear_model import Teeth, closed_loop, duty_gains, plant, quantisation_noise
+from tools.tuning.linear_model import Teeth, duty_gains, plant, quantisation_noise
+from tools.tuning.loop import closed_loop
 from tools.tuning.loop_figures import step_answer
 from tools.tuning.margins import Margins, controller, margins, noise_duty
 
@@ -25,7 +26,7 @@ def loop_transfer(teeth: Teeth, gains: Gains) -> control.TransferFunction:
     tick_s = 1.0 / CONFIG.control.tick_hz
     z = control.tf([1, 0], [1], tick_s)
     pid = proportional + integral * z / (z - 1) + derivative * (z - 1) / z
-    return pid * control.tf(plant(CONFIG, teeth)[1, 0]) / z
+    return pid * control.tf(plant(CONFIG, teeth)[1, 0])
 
 
 def grid_margins(teeth: Teeth, gains: Gains) -> Margins:
@@ -96,12 +97,12 @@ def test_the_noise_at_the_pwm_is_that_of_the_answers_to_each_count() -> None:
     window_s = window / CONFIG.control.tick_hz
     system = plant(CONFIG, Teeth.FREE)
     proportional, integral, derivative = duty_gains(CONFIG, gains)
-    state, summed, last, buffered, squares = np.zeros(system.nstates), 0.0, 0.0, 0.0, 0.0
+    state, summed, last, squares = np.zeros(system.nstates), 0.0, 0.0, 0.0
     for tick in range(1000):
         rounding = (float(tick == 0) - float(tick == window)) * count_deg / window_s
         measured = float(system.C[1] @ state) + rounding
         summed -= integral * measured
-        duty, buffered = buffered, -proportional * measured + summed - derivative * (measured - last)
+        duty = -proportional * measured + summed - derivative * (measured - last)
         last = measured
         squares += duty**2
         state = system.A @ state + system.B[:, 0] * duty
