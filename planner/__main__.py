@@ -3,13 +3,11 @@
 import argparse
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 
-from planner.commands import map as map_command
-from planner.commands import plan as plan_command
-from planner.commands import run as run_command
-from planner.commands import scan as scan_command
-from planner.commands import show as show_command
+from planner.commands.command_line import parser
 from planner.errors import PlannerError
+from planner.kinematics.configuration import Configuration
 from protocol.interrupts import ended_by_signals, said, status_after
 
 _BAD_INPUT = 2
@@ -20,25 +18,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0; 1 for a negative verdict; 2 for input that cannot be used; 128 and the number of the signal that ended it.
     """
-    parser = argparse.ArgumentParser(
-        prog="python -m planner",
-        description="Plan the motion of a rotary table under a scanning robot arm.",
-        epilog="example: python -m planner map mould --out build/mould",
-    )
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    map_command.add_parser(commands)
-    plan_command.add_parser(commands)
-    run_command.add_parser(commands)
-    scan_command.add_parser(commands)
-    show_command.add_parser(commands)
-    chosen = parser.parse_args(arguments)
+    chosen = parser().parse_args(arguments)
     with ended_by_signals() as ending:
         return ending.status(_status_of(chosen))
 
 
 def _status_of(chosen: argparse.Namespace) -> int:
     try:
-        return int(chosen.run(chosen))
+        if getattr(chosen, "configuration", "all") not in {"all", "best"}:
+            Configuration.parse(chosen.configuration)  # a misspelt name is refused before what takes long is loaded
+        return int(import_module(f"planner.commands.{chosen.command}").run(chosen))
     except PlannerError as error:
         print(error, file=sys.stderr)
         return _BAD_INPUT

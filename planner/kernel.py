@@ -1,34 +1,42 @@
-"""Compile a numeric kernel with numba, and keep the machine code between runs.
+"""Mark a numeric function to be compiled by numba at its first call; numba is not imported before that.
 
-Numba's own cache asks only whether the file of the *called* kernel has changed, so a kernel that calls one in
-another file would keep running that file's old code. Here the cache's folder is named after the source of the whole
-package: any change of it compiles anew.
+What is called from Python is compiled as a whole, with everything that it calls, and kept between runs. The parts have
+no machine code of their own unless Python calls them too: that would double the time that compiling takes.
 """
 
-import hashlib
-import os
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
+from functools import update_wrapper
 from typing import Any, TypeVar, cast
-
-import numba
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-@cache
-def cache_directory() -> Path:
-    """Return the folder of the machine code that belongs to this source.
+class _Kernel:
+    """A function that runs compiled, called from Python or from another kernel."""
 
-    It lies under numba's own cache folder where one is set (`NUMBA_CACHE_DIR`), else under the user's.
-    """
-    digest = hashlib.sha256()
-    package = Path(__file__).parent
-    for source in sorted(package.rglob("*.py")):
-        digest.update(str(source.relative_to(package)).encode() + b"\0" + source.read_bytes())
-    user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "seventh-axis"
-    return Path(os.environ.get("NUMBA_CACHE_DIR") or user_cache) / digest.hexdigest()[:16]
+    def __init__(self, function: Callable[..., Any]) -> None:
+        update_wrapper(self, function)
+        self.py_func = function
+        self._within: Any = None
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # numba's dispatcher
+        if name != "_compiled":
+            raise AttributeError(name)
+        from protocol.machine_code import compiled  # noqa: PLC0415  # see above
+
+        self._compiled = compiled(self.py_func)
+        return self._compiled
+
+    def __call__(self, *arguments: Any) -> Any:  # noqa: ANN401  # what the function takes and returns
+        return self._compiled(*arguments)
+
+    @property
+    def _numba_type_(self) -> Any:  # noqa: ANN401  # numba's type, of which it asks a global of a compiled function
+        from protocol.machine_code import within_type  # noqa: PLC0415  # see above
+
+        if self._within is None:
+            self._within = within_type(self.py_func)
+        return self._within
 
 
 def kernel(function: Function) -> Function:
@@ -36,10 +44,4 @@ def kernel(function: Function) -> Function:
 
     Floating-point results are those of the interpreted function to the last bit (no fast-math, no fused operations).
     """
-    configured = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_directory())
-    try:
-        compiled = numba.njit(cache=True, error_model="numpy", nogil=True)(function)
-    finally:
-        numba.config.CACHE_DIR = configured
-    return cast("Function", compiled)
+    return cast("Function", _Kernel(function))

@@ -64,6 +64,7 @@ EDGE_MODULES = {
 PROTOCOL_EDGE = {
     "protocol/clock.py": {"time"},
     "protocol/interrupts.py": {"signal", "threading"},
+    "protocol/kept_code.py": {"os", "pathlib", "time"},
     "protocol/quiet_start.py": {"os", "signal"},
     "protocol/conformance/__main__.py": {"pathlib"},
     "protocol/conformance/commands/command_line.py": {"os"},
@@ -80,6 +81,7 @@ PROTOCOL_EDGE = {
     "protocol/conformance/bench/stand.py": {"pathlib", "socket"},
     "protocol/conformance/commands/suite_run.py": {"datetime", "os", "pathlib"},
     "protocol/serial_port.py": {"serial"},
+    "protocol/whole_file.py": {"os", "pathlib"},
 }
 
 EMULATOR_EDGE = {
@@ -89,7 +91,6 @@ EMULATOR_EDGE = {
     "control_socket",
     "device_link",
     "inotify",
-    "machine_code_folder",
     "pty_port",
     "readiness",
     "rfc2217_port",

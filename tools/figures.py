@@ -31,7 +31,7 @@ from planner.planning.problem import Problem
 from planner.planning.ray_shooting import Rays, cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
 from planner.table.cost import Weights
 from planner.table.motion import Limits, limited_acceleration, next_angle, next_speed
-from planner.whole_file import whole_file
+from protocol.whole_file import whole_file
 from tools.command_line import ended
 
 RAY_COLOUR = "#7fb2e5"

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from emulator.config.table_config import load_config
 from emulator.config.toml_section import ConfigError
-from planner.whole_file import write_whole
 from protocol.client import TableClient
 from protocol.errors import TableError
+from protocol.whole_file import write_whole
 from tools.command_line import check_writable, ended
 from tools.identification.errors import RecordingError
 from tools.identification.excitation import excitation

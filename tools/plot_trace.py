@@ -15,8 +15,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from emulator.trace import Trace, read_trace
-from planner.whole_file import whole_file
 from protocol.data_file import did_you_mean
+from protocol.whole_file import whole_file
 from tools.command_line import ended
 from tools.command_marks import commands_of, mark_commands
 from tools.envelope import envelope

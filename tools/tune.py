@@ -21,7 +21,7 @@ from pathlib import Path
 
 from emulator.config.table_config import load_config
 from emulator.config.toml_section import ConfigError
-from planner.whole_file import whole_file
+from protocol.whole_file import whole_file
 from tools.command_line import check_folder, ended
 from tools.progress import Progress
 from tools.tuning.bounds import Limits

@@ -11,9 +11,9 @@ from contextlib import nullcontext
 from importlib.util import find_spec
 from typing import Final
 
-from emulator.table.machine_code_folder import has_machine_code
 from emulator.table.tick import TableConstants, TableState, run_undisturbed
 from protocol.interrupts import signals_wait
+from protocol.kept_code import is_kept
 
 Run = Callable[[TableConstants, TableState, float, int], tuple[TableState, bool]]
 """What passes undisturbed ticks; see `tick.run_undisturbed`."""
@@ -82,7 +82,7 @@ class FastTicks:
             return False
         if self.warm_up_ticks is None:
             self.warm_up_ticks = NEW_TICKS
-            if has_machine_code():
+            if is_kept(run_undisturbed):
                 self.warm_up_ticks = LOADED_TICKS if "numba" in sys.modules else KEPT_TICKS
         if self._interpreted_ticks < self.warm_up_ticks:
             return False

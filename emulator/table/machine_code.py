@@ -1,4 +1,4 @@
-"""Compile the tick with numba, and keep the machine code between runs.
+"""Let numba compile the tick where a compiled function calls it.
 
 The compiled functions are those that the emulator interprets, so states agree to the last bit; tests hold them to it.
 This module needs numba, the emulator does not.
@@ -8,26 +8,17 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import Any
 
-import numba
 from numba.extending import register_jitable
 
 from emulator import int32
 from emulator.firmware import controller, fixed_point, pid, profiler
 from emulator.plant import drive_train, encoder, friction
 from emulator.table import tick
-from emulator.table.machine_code_folder import machine_code_folder
+from protocol.machine_code import compiled
+
+__all__ = ["compiled", "inlined"]
 
 _MODULES = (int32, fixed_point, friction, drive_train, encoder, profiler, pid, controller, tick)
-
-
-def compiled(function: Callable[..., Any]) -> Any:  # noqa: ANN401  # numba's dispatcher
-    """Return `function` compiled at its first call, or taken from an earlier run of this source."""
-    configured = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(machine_code_folder())
-    try:
-        return numba.njit(error_model="numpy", nogil=True, cache=True)(function)
-    finally:
-        numba.config.CACHE_DIR = configured
 
 
 def inlined(function: Callable[..., Any]) -> None:

@@ -18,8 +18,9 @@ from planner.cell.cell import Cell, Probe, Table, placement
 from planner.cell.patterns import PATTERNS, StripLayout
 from planner.cell.scan_path import ScanPath, at_scan_speed, load_scan_path
 from planner.cell.workpiece import CLASSES, Workpiece
+from planner.defaults import MILLIMETRES, SCANS, shipped_scans
 from planner.errors import PlannerError, ScanFileError, WorkpieceError
-from planner.geometry.mesh import MILLIMETRES, load_mesh, radius_about_axis_mm, size_fault
+from planner.geometry.mesh import load_mesh, radius_about_axis_mm, size_fault
 from planner.kinematics.arm import Arm
 from planner.kinematics.value import ValueFunction
 from planner.progress import Progress
@@ -27,7 +28,6 @@ from planner.table.cost import Weights, costs_overflow, default_weights
 from planner.table.motion import Limits
 from planner.toml_table import TomlTable
 
-_SHIPPED = Path(__file__).parents[1] / "scans"
 _DEFAULT_ARM = "viper_s650"
 # A workpiece may touch the table, and a mesh's base need not be ground flat.
 _BASE_TOLERANCE_MM = 0.5
@@ -62,11 +62,6 @@ class Scan:
     weights: Weights
 
 
-def shipped_scans() -> list[str]:
-    """Return the names of the scans that come with the planner."""
-    return sorted(file.stem for file in _SHIPPED.glob("*.toml"))
-
-
 def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progress: Progress | None = None) -> Scan:
     """Return the scan of a TOML file, or a shipped one by its name.
 
@@ -78,7 +73,7 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progre
     Raises:
         PlannerError: A file cannot be read, or holds a key, value or shape that is not allowed; the message names it.
     """
-    shipped = _SHIPPED / f"{scan}.toml"
+    shipped = SCANS / f"{scan}.toml"
     file = shipped if shipped.is_file() else Path(scan)
     if not file.is_file():
         raise ScanFileError(f"{scan} is neither a scan file nor one of the shipped scans {', '.join(shipped_scans())}")

@@ -22,20 +22,6 @@ from planner.set_aside import set_aside
 MAP_RESULTS = (MAP_FILE, "map.png", "map_cylinder.png")
 
 
-def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the command to `python -m planner`."""
-    parser = commands.add_parser(
-        "map",
-        help="compute and draw a scan's configuration map",
-        description="Rate every location of a scan at every table angle, and say why where the arm cannot be.",
-        epilog="example: python -m planner map mould --configuration LEFTY-ABOVE-NOFLIP --out build/mould",
-    )
-    options.add_scan(parser)
-    options.add_map(parser, configuration="all")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the map and its pictures")
-    parser.set_defaults(run=run)
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Write `map.npz`, `map.png` and `map_cylinder.png`, print what can be reached, and return the exit status."""
     set_aside(arguments.out, MAP_RESULTS)

@@ -1,7 +1,6 @@
 """`python -m planner plan`: choose the table's motion along a scan, write it down, and say how good it is."""
 
 import argparse
-import math
 import sys
 import time
 from collections.abc import Mapping
@@ -26,7 +25,7 @@ from planner.planning.best_configuration import best_configuration
 from planner.planning.plan import NoPlan, Outcome, Plan, Planner
 from planner.planning.plan_file import plan_document, save_plan
 from planner.planning.plan_plots import plot_plan
-from planner.planning.planners import DEFAULT_PLANNER, PLANNERS
+from planner.planning.planners import PLANNERS
 from planner.planning.problem import Problem
 from planner.planning.smoothing import smooth
 from planner.planning.verification import verify
@@ -36,39 +35,6 @@ from planner.set_aside import set_aside
 _NO_PLAN = 1
 # A run belongs to its plan: beside another plan it would pass for a run of that.
 PLAN_RESULTS = (PLAN_FILE, "plan.png", "arm.png", MAP_FILE, *RUN_RESULTS)
-
-
-def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the command to `python -m planner`."""
-    parser = commands.add_parser(
-        "plan",
-        help="plan the table's motion along a scan",
-        description="Choose the table's motion across a scan's configuration map. Exit status 1 where there is none,"
-        " or none that the arm can follow.",
-        epilog="example: python -m planner plan mould --compare --out build/mould",
-    )
-    options.add_scan(parser)
-    options.add_map(parser, configuration="best")
-    parser.add_argument(
-        "--planner", choices=list(PLANNERS), default=DEFAULT_PLANNER, help=f"default: {DEFAULT_PLANNER}"
-    )
-    parser.add_argument("--start", type=_angle, metavar="DEG", help="table angle at the first location (default: free)")
-    parser.add_argument("--smooth", action="store_true", help="lower the plan's acceleration peaks afterwards")
-    parser.add_argument("--compare", action="store_true", help="run all planners and print a table of them")
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for plan.json, its pictures and the map"
-    )
-    parser.set_defaults(run=run)
-
-
-def _angle(text: str) -> float:
-    try:
-        angle = float(text)
-    except ValueError:
-        angle = math.nan
-    if not math.isfinite(angle):
-        raise argparse.ArgumentTypeError(f"is {text}; allowed is any angle in degrees")
-    return angle
 
 
 def run(arguments: argparse.Namespace) -> int:

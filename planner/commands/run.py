@@ -2,63 +2,15 @@
 
 import argparse
 import sys
-from pathlib import Path
 
 from planner.commands import options
 from planner.errors import PlannerError
-from planner.execution.execute import Settings
 from planner.execution.run import RunOptions, run_plan
-from planner.execution.run_verification import DEFAULT_TOLERANCE_DEG, RunVerification
+from planner.execution.run_verification import RunVerification
 from planner.progress import progress_line
 from protocol import TableError
 
 _DEVIATED, _NOT_RUN = 1, 2
-
-
-def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the command to `python -m planner`."""
-    parser = commands.add_parser(
-        "run",
-        help="carry out a plan on a table, and verify the motion",
-        description="Stream a plan to the table at a port; exit status 1 when the motion deviated from the plan.",
-        epilog="example: python -m planner run build/cylinder/plan.json --port /dev/ttyUSB0 --out build/cylinder/run",
-    )
-    parser.add_argument("plan", metavar="PLAN.json", type=Path, help="a plan that python -m planner plan has written")
-    parser.add_argument(
-        "--port",
-        metavar="URL",
-        required=True,
-        help="a device, socket://HOST:PORT, or emulator:// for a simulated table",
-    )
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, required=True, help="folder for run.json, run.csv and run.png"
-    )
-    parser.add_argument("--map", metavar="FILE", type=Path, help="the plan's map (default: map.npz beside the plan)")
-    options.add_wire(parser)
-    parser.add_argument(
-        "--timeout",
-        type=options.positive_number,
-        default=1.0,
-        metavar="S",
-        help="wait this long for a reply (default 1)",
-    )
-    parser.add_argument(
-        "--lead", type=options.number(-1.0, 1.0), default=Settings().lead_s, metavar="S",
-        help="send commands ahead by the encoder's lag behind the reference: 0.0035 for the stand-in (default 0)",
-    )  # fmt: skip
-    options.add_lag(parser)
-    parser.add_argument(
-        "--tolerance", type=options.positive_number, default=DEFAULT_TOLERANCE_DEG, metavar="DEG",
-        help="what the encoder may deviate at a location (default %(default)s)",
-    )  # fmt: skip
-    options.add_run_on(parser)
-    parser.add_argument(
-        "--arm-away",
-        action="store_true",
-        help="the arm is drawn back until the table stands at the start: any way there is free",
-    )
-    options.add_stand_in(parser)
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

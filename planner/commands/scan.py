@@ -7,56 +7,17 @@ from pathlib import Path
 from planner.cell.scan import load_scan, with_mesh
 from planner.commands import options
 from planner.errors import PlannerError
-from planner.geometry.mesh import MILLIMETRES
 from planner.progress import progress_line
 from planner.scanning.latched_run import TriggerConditions
 from planner.scanning.scan_file import save_scan, scan_document
 from planner.scanning.scan_report import scan_report, verdict_of
 from planner.scanning.scan_run import Scanned, ScanOptions, scan_workpiece
 from planner.set_aside import set_aside
-from planner.whole_file import write_whole
 from protocol import TableError
+from protocol.whole_file import write_whole
 
 _INCOMPLETE = 1
 SCAN_RESULTS = ("cloud.ply", "cloud.xyz", "scan.json", "report.html")
-
-
-def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the command to `python -m planner`."""
-    parser = commands.add_parser(
-        "scan",
-        help="scan a workpiece with a simulated probe, and compute the error budget of its cloud",
-        description="Plan a scan, move the table, take laser profiles and align them to one cloud; exit status 1 when"
-        " it ended early.",
-        epilog="example: python -m planner scan cylinder --decimals 3 --out build/cylinder",
-    )
-    options.add_scan(parser)
-    parser.add_argument("--mesh", type=Path, metavar="FILE", help="replace the workpiece by this mesh")
-    parser.add_argument("--unit", choices=tuple(MILLIMETRES), help="unit of length in --mesh (default mm)")
-    parser.add_argument(
-        "--port", metavar="URL", default="emulator://",
-        help="emulator:// for a table in simulated time (the default), or a stand-in's port along with --control",
-    )  # fmt: skip
-    options.add_stand_in(parser)
-    options.add_wire(parser)
-    options.add_lag(parser)
-    parser.add_argument(
-        "--rate", type=options.positive_number, default=TriggerConditions().rate_hz, metavar="HZ",
-        help="profiles a second (default %(default)g)",
-    )  # fmt: skip
-    options.add_run_on(parser)
-    options.add_map(parser, configuration="best")
-    parser.add_argument(
-        "--exact-calibration", action="store_true", help="align with the true placements instead of calibrated ones"
-    )
-    parser.add_argument("--xyz", action="store_true", help="write cloud.xyz as well")
-    parser.add_argument(
-        "--seed", type=options.whole_number(0, 2**31), default=0, metavar="N", help="chooses all noise (default 0)"
-    )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for cloud.ply, scan.json and report.html"
-    )
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -4,26 +4,12 @@ import argparse
 import sys
 from pathlib import Path
 
+from planner.commands.command_line import REPORT_FILE
 from planner.errors import PlannerError
 from planner.execution.run_file import load_run
 from planner.execution.run_report import run_report
 from planner.execution.run_verification import verify_run
-from planner.whole_file import write_whole
-
-REPORT_FILE = "report.html"
-
-
-def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the command to `python -m planner`."""
-    parser = commands.add_parser(
-        "show",
-        help="show a run as one HTML page",
-        description="Write a page that shows a run, with everything in it: map, paths, profile, deviations, commands.",
-        epilog="example: python -m planner show build/cylinder/run",
-    )
-    parser.add_argument("folder", metavar="DIR", type=Path, help="what python -m planner run has written")
-    parser.add_argument("--out", metavar="FILE", type=Path, help=f"the page (default: {REPORT_FILE} in DIR)")
-    parser.set_defaults(run=run)
+from protocol.whole_file import write_whole
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -8,9 +8,9 @@ happens.
 from contextlib import suppress
 from typing import NamedTuple
 
+from planner.defaults import LAG_S, LEAD_S, RUN_ON_DEG
 from planner.errors import PlannerError
 from planner.execution.inside_view import InsideView
-from planner.execution.run_on import DEFAULT_RUN_ON_DEG
 from planner.execution.run_record import Record, Sent
 from planner.execution.stream import TimedCommand
 from planner.execution.stream_correction import CorrectedStream
@@ -53,14 +53,14 @@ class Settings(NamedTuple):
         run_on_deg: how far the table may run on when the line dies.
     """
 
-    lag_s: float = 0.0035
-    lead_s: float = 0.0
+    lag_s: float = LAG_S
+    lead_s: float = LEAD_S
     tolerance_deg: float = 1.0
     drift_deg: float = 0.15
     drift_filter_s: float = 3.0
     poll_s: float = 0.05
     look_s: float = 0.02
-    run_on_deg: float = DEFAULT_RUN_ON_DEG
+    run_on_deg: float = RUN_ON_DEG
 
     @property
     def encoder_delay_s(self) -> float:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.defaults import RUN_ON_DEG, TOLERANCE_DEG
 from planner.execution.execute import Settings, bring_to, execute, resting_deg
 from planner.execution.free_way import check_ends, nearest_turns, turns_to_start
 from planner.execution.inside_view import ControlView, InsideView, view_of
@@ -21,9 +22,8 @@ from planner.execution.run_file import (
     save_run,
 )
 from planner.execution.run_input import RunInput, load_run_input
-from planner.execution.run_on import DEFAULT_RUN_ON_DEG
 from planner.execution.run_plots import plot_run
-from planner.execution.run_verification import DEFAULT_TOLERANCE_DEG, RunVerification, verify_run
+from planner.execution.run_verification import RunVerification, verify_run
 from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_motion import PauseTimes, TableMotion
 from planner.execution.table_port import open_port
@@ -42,9 +42,9 @@ class RunOptions(NamedTuple):
     decimals: int = 1
     timeout_s: float = 1.0
     lead_s: float = Settings().lead_s
-    run_on_deg: float = DEFAULT_RUN_ON_DEG
+    run_on_deg: float = RUN_ON_DEG
     lag_s: float = Settings().lag_s
-    tolerance_deg: float = DEFAULT_TOLERANCE_DEG
+    tolerance_deg: float = TOLERANCE_DEG
     control: Path | None = None
     arm_is_away: bool = False
     time_scale: float = 1.0

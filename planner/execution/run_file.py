@@ -23,8 +23,8 @@ from planner.execution.table_motion import PauseTimes, Phase, TableMotion
 from planner.map.map_file import MAP_FILE
 from planner.table.velocity_profile import MotionCommand
 from planner.table.wire import Wire
-from planner.whole_file import whole_file, write_whole
 from protocol.data_file import DataFileError, read_json
+from protocol.whole_file import whole_file, write_whole
 
 _FORMAT = "seventh-axis run"
 _FORMAT_VERSION = 1

@@ -7,8 +7,6 @@ speed; the second is S^2 / 2A. So a bound on the run-on is a least A for each sp
 
 import math
 
-DEFAULT_RUN_ON_DEG = 90.0
-
 # P is rounded up to the wire's next number, and the encoder is behind the reference and overshoots a little.
 _RESERVE_DEG = 0.5
 # Commands are not evenly spaced: this much later than a step may the next one come, by plan.

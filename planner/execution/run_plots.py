@@ -16,7 +16,7 @@ from planner.execution.run_file import StoredRun
 from planner.execution.run_verification import RunVerification
 from planner.execution.table_motion import Phase
 from planner.map.map_colours import coloured
-from planner.whole_file import whole_file
+from protocol.whole_file import whole_file
 
 PLANNED, EXECUTED, REFERENCE, TRUE, PAUSE = "#d55e00", "#0072b2", "#7a7f87", "#009e73", "#e7a33e"
 """Colours that remain apart for colour-blind readers."""

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.arrays import FloatArray
+from planner.defaults import TOLERANCE_DEG
 from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.execution.run_input import RunInput
 from planner.execution.run_record import Observation, Record
@@ -15,7 +16,6 @@ from planner.planning.crossing import crossing_is_allowed
 from planner.planning.plan import path_cost
 from planner.table.cost import PathCost
 
-DEFAULT_TOLERANCE_DEG = 0.25
 # A latch this far from the plan is that of an earlier trigger.
 _STALE_DEG = 1.0
 
@@ -95,7 +95,7 @@ def verify_run(
     motion: TableMotion,
     record: Record,
     lead_s: float,
-    tolerance_deg: float = DEFAULT_TOLERANCE_DEG,
+    tolerance_deg: float = TOLERANCE_DEG,
 ) -> RunVerification:
     """Return what a run came to.
 

@@ -11,9 +11,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
+from planner.defaults import RUN_ON_DEG
 from planner.execution.closest_command import STANDING_DEG_S, Choice, Step, closest_command, going_on, with_target
 from planner.execution.pieces import pieces_of, spacing_s
-from planner.execution.run_on import DEFAULT_RUN_ON_DEG, latest_s, next_command_within_s
+from planner.execution.run_on import latest_s, next_command_within_s
 from planner.execution.table_motion import Leg, TableMotion
 from planner.table.motion import Limits
 from planner.table.velocity_profile import MotionCommand, ReferenceState, advance
@@ -43,9 +44,7 @@ class TimedCommand(NamedTuple):
         return advance(self.expected, self.command, time_s - self.time_s)
 
 
-def stream(
-    motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float = DEFAULT_RUN_ON_DEG
-) -> tuple[TimedCommand, ...]:
+def stream(motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float = RUN_ON_DEG) -> tuple[TimedCommand, ...]:
     """Return the commands of a motion, in the order of their times.
 
     The table stands at the motion's start, as far as the wire can say that.

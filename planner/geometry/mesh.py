@@ -7,6 +7,7 @@ import numpy as np
 import trimesh
 
 from planner.arrays import FloatArray, IndexArray
+from planner.defaults import MILLIMETRES
 from planner.errors import WorkpieceError
 from planner.geometry.closed_surface import closed_surface
 from planner.geometry.crossing import first_crossing
@@ -17,8 +18,6 @@ from planner.progress import Progress
 SMALLEST_MM = 10.0
 LARGEST_MM = 1000.0
 
-MILLIMETRES: dict[str, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4}
-"""The units of length that a mesh file may be in, in mm."""
 _ASKED = {"m": "metres", "cm": "centimetres", "inch": "inches"}
 
 

@@ -19,9 +19,10 @@ from planner.arrays import FloatArray, IndexArray
 from planner.geometry.bounding_volume_hierarchy import bounding_volume_hierarchy, nearest_triangle
 from planner.geometry.shells import turned_outward
 from planner.geometry.winding_number import BESIDE, winding_numbers
-from planner.kernel import cache_directory, kernel
+from planner.kernel import kernel
 from planner.progress import Progress
-from planner.whole_file import whole_file
+from protocol.kept_code import cache_root
+from protocol.whole_file import whole_file
 
 _MOST_POINTS = 4_000_000
 _RULES = b"nested grids, any winding, signs by the nesting of shells"
@@ -163,7 +164,7 @@ def cached_field(
 
 
 def _cache_folder() -> Path:
-    return cache_directory().parent / "distance-fields"
+    return cache_root() / "distance-fields"
 
 
 def _digest(mesh: trimesh.Trimesh, spacing_mm: float) -> str:

@@ -17,7 +17,7 @@ from planner.errors import PlannerError
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap, ConfigurationMapError
 from planner.software_version import software_version
-from planner.whole_file import whole_file
+from protocol.whole_file import whole_file
 
 MAP_FILE = "map.npz"
 """The name of a map's file in a folder of results."""

@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from planner.arrays import FloatArray
 from planner.map.config_map import ConfigurationMap
 from planner.map.map_colours import DARKEST_GRAY, LegendEntry, coloured
-from planner.whole_file import whole_file
+from protocol.whole_file import whole_file
 
 _DPI = 120
 _LEGEND_COLUMNS = 3

@@ -8,7 +8,8 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.cell.cell import Cell
 from planner.kinematics.arm import Arm
-from planner.kinematics.configuration import Configuration, configurations
+from planner.kinematics.configuration import Configuration
+from planner.kinematics.joint_configurations import configurations
 from planner.kinematics.joint_limits import first_joint_fault
 from planner.planning.plan import Plan
 

@@ -1,6 +1,7 @@
 """Plans that the arm can follow: those of a planner, and where the arm refuses one, the best of a search with turns."""
 
 from collections.abc import Iterator
+from functools import wraps
 
 import numpy as np
 
@@ -29,6 +30,7 @@ TUBE_Q, TUBE_SPEEDS, PASSES = 24, 6, 6
 def obeying_the_arm(planner: Planner) -> Planner:
     """Return the planner with other plans where the arm of the problem cannot follow its own."""
 
+    @wraps(planner)
     def plan(problem: Problem) -> Outcome:
         outcome = planner(problem)
         if problem.arm is None or isinstance(outcome, NoPlan) or arm_motion(problem.arm, outcome).step is None:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from planner.planning.arm_motion import ArmMotion
 from planner.planning.plan_plots import CURVE_COLOUR, PLAN_COLOUR
-from planner.whole_file import whole_file
+from protocol.whole_file import whole_file
 
 _DPI = 120
 

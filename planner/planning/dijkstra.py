@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra as shortest_paths
 
 from planner.arrays import FloatArray, IndexArray
+from planner.defaults import DIJKSTRA
 from planner.kernel import kernel
 from planner.map.config_map import column_value, wrapped
 from planner.planning.crossing import step_is_allowed
@@ -23,8 +24,6 @@ from planner.planning.plan import Infeasibility, NoPlan, Outcome, make_plan, obv
 from planner.planning.problem import Problem, Terms
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import Motion
-
-NAME = "dijkstra"
 
 # Speeds each way, from what is wanted to what must do; scipy needs 40 bytes an edge.
 SPEED_COUNTS = (10, 7, 5, 3, 2, 1)
@@ -59,12 +58,12 @@ class Edges(NamedTuple):
 
 def dijkstra(problem: Problem, lattice: Lattice | None = None) -> Outcome:
     """Return the shortest path in the graph of a lattice; without one, of the finest of a few that fits into memory."""
-    no_plan = obvious_infeasibility(problem, NAME)
+    no_plan = obvious_infeasibility(problem, DIJKSTRA)
     if no_plan is not None:
         return no_plan
     lattice = lattice or _lattice_that_fits(problem)
     path = None if lattice is None else shortest_path(problem, lattice)
-    return NoPlan(NAME, Infeasibility.NOT_FOUND) if path is None else make_plan(problem, NAME, *path.motion)
+    return NoPlan(DIJKSTRA, Infeasibility.NOT_FOUND) if path is None else make_plan(problem, DIJKSTRA, *path.motion)
 
 
 def _lattice_that_fits(problem: Problem) -> Lattice | None:

@@ -7,6 +7,7 @@ and a finer lattice. Each turn doubles the speeds that they use.
 from dataclasses import replace
 from typing import NamedTuple
 
+from planner.defaults import DYNAMIC_PROGRAMMING
 from planner.planning.crossable_intervals import crossing_motion
 from planner.planning.interpolated_planner import interpolated_plan
 from planner.planning.iterative_dynamic_programming import best_around, refine, tube
@@ -18,8 +19,6 @@ from planner.planning.problem import Problem
 from planner.planning.unreachability_proof import first_unreachable_location
 from planner.planning.verification import verify
 from planner.table.motion import Motion
-
-NAME = "dynamic_programming"
 
 # The first lattice: its speeds each way, at least, and which share of the greatest speed it must have, from what is
 # wanted to what must do; and how many steps it may have per column, or in total on a short path.
@@ -68,7 +67,7 @@ def dynamic_programming(problem: Problem) -> Outcome:
 
     It costs at most what the best path of a lattice costs that has 20 speeds each way, to about a percent.
     """
-    no_plan = obvious_infeasibility(problem, NAME)
+    no_plan = obvious_infeasibility(problem, DYNAMIC_PROGRAMMING)
     if no_plan is not None:
         return no_plan
     plan = first_plan(problem)
@@ -81,7 +80,11 @@ def first_plan(problem: Problem) -> Plan | None:
     if lattice is not None:
         return lattice_plan(problem, lattice)
     plan = interpolated_plan(problem)
-    return None if plan is None else refine(problem, replace(plan, planner=NAME), 0.25 * problem.map.angle_step_deg)
+    return (
+        None
+        if plan is None
+        else refine(problem, replace(plan, planner=DYNAMIC_PROGRAMMING), 0.25 * problem.map.angle_step_deg)
+    )
 
 
 def first_lattice(problem: Problem, reference: Motion | None = None) -> Lattice | None:
@@ -101,7 +104,7 @@ def lattice_plan(problem: Problem, lattice: Lattice) -> Plan | None:
     tempting = best_motion(problem, with_limits_rounded_up(lattice, problem), limits_rounded_up(lattice, problem))
     if tempting is None:
         return None
-    temptation = make_plan(problem, NAME, *tempting)
+    temptation = make_plan(problem, DYNAMIC_PROGRAMMING, *tempting)
     node_deg = 0.5 * lattice.node_deg
     if verify(problem, temptation).within_limits:
         return refine(problem, temptation, node_deg)
@@ -110,7 +113,7 @@ def lattice_plan(problem: Problem, lattice: Lattice) -> Plan | None:
     for around in (*tubes, lattice):
         motion = best_motion(problem, around)
         if motion is not None:
-            plans.append(refine(problem, make_plan(problem, NAME, *motion), node_deg))
+            plans.append(refine(problem, make_plan(problem, DYNAMIC_PROGRAMMING, *motion), node_deg))
             if plans[-1].cost.total <= KEPT * temptation.cost.total:
                 break
     return min(plans, key=lambda plan: plan.cost.total, default=None)
@@ -121,12 +124,12 @@ def search_harder(problem: Problem) -> Outcome:
     for effort in EFFORTS:
         location = first_unreachable_location(problem, effort.cells)
         if location is not None:
-            return NoPlan(NAME, Infeasibility.UNREACHABLE, location)
+            return NoPlan(DYNAMIC_PROGRAMMING, Infeasibility.UNREACHABLE, location)
         plans = [_plan_through_intervals(problem, effort), _plan_on_finer_lattice(problem, effort)]
         found = [plan for plan in plans if plan is not None]
         if found:
             return min(found, key=lambda plan: plan.cost.total)
-    return NoPlan(NAME, Infeasibility.NOT_FOUND)
+    return NoPlan(DYNAMIC_PROGRAMMING, Infeasibility.NOT_FOUND)
 
 
 def _plan_on_finer_lattice(problem: Problem, effort: Effort) -> Plan | None:
@@ -140,7 +143,7 @@ def _plan_through_intervals(problem: Problem, effort: Effort) -> Plan | None:
     motion = crossing_motion(problem, effort.speeds_per_gain)
     if motion is None:
         return None
-    plan = make_plan(problem, NAME, *motion)
+    plan = make_plan(problem, DYNAMIC_PROGRAMMING, *motion)
     around = first_lattice(problem, motion)
     if around is None:
         return refine(problem, plan, 0.25 * problem.map.angle_step_deg)

@@ -16,8 +16,8 @@ from planner.planning.problem import Problem
 from planner.planning.verification import verify
 from planner.software_version import software_version
 from planner.table.cost import PathCost
-from planner.whole_file import write_whole
 from protocol.data_file import DataFileError, read_json
+from protocol.whole_file import write_whole
 
 _FORMAT = "seventh-axis plan"
 _FORMAT_VERSION = 1

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from planner.arrays import FloatArray
 from planner.planning.plan import Plan
 from planner.planning.problem import Problem
-from planner.whole_file import whole_file
+from protocol.whole_file import whole_file
 
 PLAN_COLOUR, CURVE_COLOUR, PAUSE_COLOUR = "#d62728", "#1f77b4", "#e7a33e"
 _DPI = 120

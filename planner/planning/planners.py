@@ -3,27 +3,30 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from planner.planning import (
-    arm_planning,
-    dijkstra,
-    dynamic_programming,
-    local_maxima,
-    ray_shooting,
-    receding,
-    rotate_when_blocked,
-)
+from planner.defaults import PLANNER_NAMES
+from planner.planning.arm_planning import obeying_the_arm
+from planner.planning.dijkstra import dijkstra
+from planner.planning.dynamic_programming import dynamic_programming
+from planner.planning.local_maxima import local_maxima
 from planner.planning.plan import Planner
-
-DEFAULT_PLANNER = dynamic_programming.NAME
+from planner.planning.ray_shooting import guided_ray_shooting, ray_shooting
+from planner.planning.receding import receding
+from planner.planning.rotate_when_blocked import rotate_when_blocked
 
 PLANNERS: Mapping[str, Planner] = MappingProxyType(
-    {
-        dynamic_programming.NAME: arm_planning.obeying_the_arm(dynamic_programming.dynamic_programming),
-        receding.NAME: receding.receding,
-        ray_shooting.GUIDED_NAME: ray_shooting.guided_ray_shooting,
-        ray_shooting.NAME: ray_shooting.ray_shooting,
-        rotate_when_blocked.NAME: rotate_when_blocked.rotate_when_blocked,
-        dijkstra.NAME: dijkstra.dijkstra,
-        local_maxima.NAME: local_maxima.local_maxima,
-    }
+    dict(
+        zip(
+            PLANNER_NAMES,
+            (
+                obeying_the_arm(dynamic_programming),
+                receding,
+                guided_ray_shooting,
+                ray_shooting,
+                rotate_when_blocked,
+                dijkstra,
+                local_maxima,
+            ),
+            strict=True,
+        )
+    )
 )

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.arrays import FloatArray
+from planner.defaults import GUIDED_RAY_SHOOTING, RAY_SHOOTING
 from planner.errors import PlannerError
 from planner.kernel import kernel
 from planner.map.config_map import column_value
@@ -17,9 +18,6 @@ from planner.planning.rotate_when_blocked import nearest_allowed_angle
 from planner.planning.state_grid import Grid, default_grid
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import limited_acceleration, next_angle, next_speed
-
-NAME = "ray_shooting"
-GUIDED_NAME = "guided_ray_shooting"
 
 
 class Rays(NamedTuple):
@@ -55,12 +53,14 @@ def ray_shooting(problem: Problem, rays: Rays | None = None) -> Outcome:
 
     A free start is at rest at the brightest angle of the first location.
     """
-    return _shoot(problem, rays or Rays(), NAME, no_cost_to_go)
+    return _shoot(problem, rays or Rays(), RAY_SHOOTING, no_cost_to_go)
 
 
 def guided_ray_shooting(problem: Problem, rays: Rays | None = None) -> Outcome:
     """Return the plan of ray shooting whose rays end in the cost-to-go, so that they see beyond their horizon."""
-    return _shoot(problem, rays or GUIDED_RAYS, GUIDED_NAME, lambda asked: cost_to_go(asked, default_grid(asked)))
+    return _shoot(
+        problem, rays or GUIDED_RAYS, GUIDED_RAY_SHOOTING, lambda asked: cost_to_go(asked, default_grid(asked))
+    )
 
 
 def _shoot(problem: Problem, rays: Rays, name: str, terminal: Callable[[Problem], CostToGo]) -> Outcome:

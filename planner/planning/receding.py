@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.arrays import CostArray, FloatArray
+from planner.defaults import RECEDING
 from planner.errors import PlannerError
 from planner.kernel import kernel
 from planner.map.config_map import column_value
@@ -22,8 +23,6 @@ from planner.planning.problem import Problem, Terms
 from planner.planning.state_grid import Grid, default_grid
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import next_angle, next_speed
-
-NAME = "receding"
 
 # With 50 columns of 100 angles in view a step takes 0.4 ms; with the fast grid 0.15 ms, at a few per cent more cost.
 SPEED_COUNT = 31
@@ -65,7 +64,7 @@ def receding(problem: Problem, columns_in_view: int = 50, speed_count: int = SPE
     """
     if columns_in_view < 1:
         raise HorizonError(f"the view is {columns_in_view} columns; allowed is 1 or more")
-    no_plan = obvious_infeasibility(problem, NAME)
+    no_plan = obvious_infeasibility(problem, RECEDING)
     if no_plan is not None:
         return no_plan
     angle_deg, speed_deg_s = greedy_start(problem)
@@ -77,7 +76,7 @@ def receding(problem: Problem, columns_in_view: int = 50, speed_count: int = SPE
     paused = np.flatnonzero(np.isnan(accelerations))
     accelerations[paused] = 0.0
     pauses = [Pause(int(k), float(angles[k]), float(angles[k + 1])) for k in paused]
-    return make_plan(problem, NAME, angles, speeds, accelerations, pauses)
+    return make_plan(problem, RECEDING, angles, speeds, accelerations, pauses)
 
 
 def prepare_online_step(problem: Problem, speed_count: int = SPEED_COUNT) -> OnlineStep:

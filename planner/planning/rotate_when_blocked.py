@@ -2,12 +2,11 @@
 
 import numpy as np
 
+from planner.defaults import ROTATE_WHEN_BLOCKED
 from planner.kernel import kernel
 from planner.map.config_map import column_value, sample_at_or_above, sample_at_or_below
 from planner.planning.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
 from planner.planning.problem import Problem, Terms
-
-NAME = "rotate_when_blocked"
 
 
 def rotate_when_blocked(problem: Problem) -> Outcome:
@@ -15,7 +14,7 @@ def rotate_when_blocked(problem: Problem) -> Outcome:
 
     A free start is at rest at the brightest angle of the first location; a start in motion pauses at once.
     """
-    no_plan = obvious_infeasibility(problem, NAME)
+    no_plan = obvious_infeasibility(problem, ROTATE_WHEN_BLOCKED)
     if no_plan is not None:
         return no_plan
     steps = problem.step_count
@@ -26,7 +25,7 @@ def rotate_when_blocked(problem: Problem) -> Outcome:
         angles[k + 1] = nearest_allowed_angle(problem.terms, k + 1, angles[k])
         if angles[k + 1] != angles[k] or speeds[k] != 0.0:
             pauses.append(Pause(k, float(angles[k]), float(angles[k + 1])))
-    return make_plan(problem, NAME, angles, speeds, np.zeros(steps), pauses)
+    return make_plan(problem, ROTATE_WHEN_BLOCKED, angles, speeds, np.zeros(steps), pauses)
 
 
 @kernel

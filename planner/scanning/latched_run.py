@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.arrays import FloatArray, IndexArray
+from planner.defaults import PROFILES_HZ
 from planner.errors import PlannerError
 from planner.execution.execute import Settings, bring_to, execute
 from planner.execution.robot_motion import RobotMotion, robot_motion
@@ -46,7 +47,7 @@ class TriggerConditions(NamedTuple):
         seed: Chooses the delays.
     """
 
-    rate_hz: float = 25.0
+    rate_hz: float = PROFILES_HZ
     delay_s: float = 0.0001
     faults: TriggerFaults = TriggerFaults()
     seed: int = 0

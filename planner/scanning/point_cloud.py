@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from planner.arrays import FloatArray, IndexArray
-from planner.whole_file import whole_file
+from protocol.whole_file import whole_file
 
 # A vertex as it lies in the file. Single precision leaves 0.03 micrometres at 500 mm.
 _COORDINATES = ("x", "y", "z", "beam_x", "beam_y", "beam_z")

@@ -16,12 +16,12 @@ import trimesh
 from planner.arrays import FloatArray
 from planner.cell.cell import placement
 from planner.cell.scan import Scan
+from planner.defaults import DEFAULT_PLANNER, RUN_ON_DEG
 from planner.errors import PlannerError
 from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.execution.execute import Settings
 from planner.execution.free_way import check_ends
 from planner.execution.inside_view import ControlView
-from planner.execution.run_on import DEFAULT_RUN_ON_DEG
 from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_motion import TableMotion
 from planner.execution.table_port import open_port
@@ -35,7 +35,7 @@ from planner.planning.arm_motion import arm_motion
 from planner.planning.arm_on_path import arm_on_path
 from planner.planning.best_configuration import best_configuration
 from planner.planning.plan import Plan
-from planner.planning.planners import DEFAULT_PLANNER, PLANNERS
+from planner.planning.planners import PLANNERS
 from planner.planning.problem import Problem
 from planner.progress import Progress
 from planner.scanning.alignment import Calibration, aligned, probe_poses
@@ -75,7 +75,7 @@ class ScanOptions(NamedTuple):
     timeout_s: float = 0.5
     control: Path | None = None
     time_scale: float = 1.0
-    run_on_deg: float = DEFAULT_RUN_ON_DEG
+    run_on_deg: float = RUN_ON_DEG
     configuration: str = "best"
     angle_count: int = 360
     exact_calibration: bool = False

@@ -12,7 +12,8 @@ import numpy as np
 from py_opw_kinematics import KinematicModel, Robot
 
 from planner.arrays import FloatArray
-from planner.cell.scan import load_scan, shipped_scans
+from planner.cell.scan import load_scan
+from planner.defaults import shipped_scans
 from planner.geometry.capsule import segment_distance
 from planner.kernel import kernel
 from planner.kinematics.arm import Arm

@@ -11,8 +11,9 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
-from planner.cell.scan import load_scan, shipped_scans
+from planner.cell.scan import load_scan
 from planner.commands.plan import problem_of
+from planner.defaults import shipped_scans
 from planner.kinematics.configuration import Configuration
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem

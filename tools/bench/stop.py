@@ -13,7 +13,7 @@ import serial
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from emulator.faults.fault import fault_from
-from planner.cell.scan import shipped_scans
+from planner.defaults import shipped_scans
 from planner.execution.execute import bring_to, execute
 from planner.execution.run_input import RunInput
 from planner.execution.table_motion import TableMotion

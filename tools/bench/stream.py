@@ -9,7 +9,7 @@ from typing import NamedTuple, TextIO
 import numpy as np
 
 from planner.arrays import FloatArray
-from planner.cell.scan import shipped_scans
+from planner.defaults import shipped_scans
 from planner.execution.execute import Settings
 from planner.execution.stream import TimedCommand, reference_states, rounded_stream, stream
 from planner.execution.table_motion import TableMotion

@@ -7,7 +7,6 @@ drive's duty is known, so there the plant runs alone.
 from math import ceil
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +16,7 @@ from emulator.firmware.profiler import Profile
 from emulator.plant import drive_train
 from emulator.plant.drive_train import DriveState, DriveTrain, at_standstill
 from emulator.table.batch import COLUMNS, run
+from emulator.table.machine_code import compiled
 from emulator.table.tick import table_constants, woken
 from protocol.interrupts import signals_wait
 from tools.emulated import Array, Motion, motion_rows
@@ -116,4 +116,4 @@ def _open_loop(train: DriveTrain, state: DriveState, voltage_V: Array, angle_rad
 
 
 # `emulator.table.batch` has made the plant's functions known to numba.
-_run_open: Any = numba.njit(error_model="numpy", nogil=True)(_open_loop)
+_run_open: Any = compiled(_open_loop)

@@ -143,7 +143,7 @@ def test_a_short_session_is_interpreted_and_a_long_one_compiled() -> None:
 def test_what_numba_still_has_to_do_is_weighed_against_what_ticks_have_cost(
     monkeypatch: pytest.MonkeyPatch, kept: bool, loaded: bool
 ) -> None:
-    monkeypatch.setattr(fast_ticks, "has_machine_code", lambda: kept)
+    monkeypatch.setattr(fast_ticks, "is_kept", lambda _function: kept)
     if not loaded:
         monkeypatch.delitem(sys.modules, "numba", raising=False)
     run = FastTicks()

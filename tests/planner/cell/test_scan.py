@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from planner.cell.scan import load_scan, shipped_scans
+from planner.cell.scan import load_scan
+from planner.defaults import shipped_scans
 from planner.errors import PlannerError, ScanFileError, WorkpieceError
 from planner.kinematics.inverse_kinematics import inverse_kinematics
 from planner.reasons import Reason

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from planner.cell.scan import load_scan, shipped_scans
+from planner.cell.scan import load_scan
 from planner.cell.scan_path import ScanPath
 from planner.cell.unit_hints import unit_hint
+from planner.defaults import shipped_scans
 
 BASE = """
 [cell]

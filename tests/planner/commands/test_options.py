@@ -1,26 +1,12 @@
-import argparse
+import subprocess
+import sys
+from typing import Any
 
 import pytest
 
 from planner.__main__ import main
-from planner.commands.options import fresh_table, positive_number, whole_number
-
-
-@pytest.mark.parametrize("text", ["8", " 9 ", "360"])
-def test_a_whole_number_within_its_bounds_is_read(text: str) -> None:
-    assert whole_number(8, 360)(text) == int(text)
-
-
-@pytest.mark.parametrize("text", ["7", "361", "8.0", "eight", ""])
-def test_another_number_is_refused_with_what_is_allowed(text: str) -> None:
-    with pytest.raises(argparse.ArgumentTypeError, match=rf"is {text}; allowed is a whole number from 8 to 360"):
-        whole_number(8, 360)(text)
-
-
-@pytest.mark.parametrize("text", ["0", "-1", "nan", "inf", "1e9", "fast"])
-def test_a_number_that_is_not_above_0_is_refused(text: str) -> None:
-    with pytest.raises(argparse.ArgumentTypeError, match=f"is {text}; allowed is a number above 0 and at most 1000"):
-        positive_number(text)
+from planner.commands.options import fresh_table
+from planner.planning.planners import PLANNERS
 
 
 @pytest.mark.parametrize(
@@ -48,3 +34,27 @@ def test_a_run_is_not_begun_with_an_option_that_cannot_be_meant(
 )
 def test_a_table_made_for_a_command_is_as_the_command_wants_unless_told_others(url: str, opened: str) -> None:
     assert fresh_table(url, decimals=3, seed=7) == opened
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--help"],
+        ["plan", "--help"],
+        ["plan", "mould"],
+        ["plan", "mould", "--out", "x", "--configuration", "UPSIDE-DOWN"],
+    ],
+)
+def test_help_and_refusals_are_there_before_anything_big_is_loaded(arguments: list[str]) -> None:
+    program = (
+        "import sys; from planner.__main__ import main\n"
+        "try: main(sys.argv[1:])\n"
+        "except SystemExit: pass\n"
+        "sys.exit(bool({'numpy', 'scipy', 'matplotlib', 'numba', 'trimesh'} & sys.modules.keys()))"
+    )
+    subprocess.run([sys.executable, "-c", program, *arguments], check=True, capture_output=True)
+
+
+def test_each_planner_has_its_name() -> None:
+    named: list[Any] = list(PLANNERS.values())
+    assert list(PLANNERS) == [planner.__name__ for planner in named]

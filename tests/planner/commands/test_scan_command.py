@@ -10,7 +10,8 @@ import trimesh
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.__main__ import main
 from planner.arrays import FloatArray
-from planner.cell.scan import load_scan, shipped_scans
+from planner.cell.scan import load_scan
+from planner.defaults import shipped_scans
 from planner.execution.free_way import WayError
 from planner.map.synthetic_maps import blocks_map
 from planner.planning.arm_motion import ArmMotion, arm_motion

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from emulator.table.table import Table
-from planner.cell.scan import shipped_scans
+from planner.defaults import shipped_scans
 from planner.execution.dead_line import judge_dead_line
 from planner.execution.execute import Settings, bring_to, execute
 from planner.execution.run_on import latest_s

@@ -3,7 +3,8 @@ import pytest
 
 from planner.errors import ConfigurationNameError
 from planner.kinematics.arm import Arm
-from planner.kinematics.configuration import Configuration, configurations
+from planner.kinematics.configuration import Configuration
+from planner.kinematics.joint_configurations import configurations
 
 VIPER = Arm.load()
 

@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from planner.arrays import FloatArray
 from planner.kinematics.arm import Arm
-from planner.kinematics.configuration import Configuration, configurations
+from planner.kinematics.configuration import Configuration
 from planner.kinematics.inverse_kinematics import inverse_kinematics
+from planner.kinematics.joint_configurations import configurations
 from planner.reasons import Reason
 
 VIPER = Arm.load()

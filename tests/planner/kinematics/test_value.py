@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from planner.errors import ScanFileError
 from planner.kinematics.arm import Arm
-from planner.kinematics.configuration import Configuration, configurations
+from planner.kinematics.configuration import Configuration
+from planner.kinematics.joint_configurations import configurations
 from planner.kinematics.value import (
     FACTORS,
     UserFactor,

@@ -11,6 +11,7 @@ from planner.cell.cell import placement
 from planner.cell.scan import load_scan
 from planner.cell.scan_path import ScanPath
 from planner.commands.plan import problem_of, smoothed
+from planner.defaults import DEFAULT_PLANNER
 from planner.geometry.transforms import rotations_z
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
@@ -23,7 +24,7 @@ from planner.planning.arm_on_path import ArmOnPath
 from planner.planning.dynamic_programming import dynamic_programming
 from planner.planning.joint_turns import Margin
 from planner.planning.plan import Infeasibility, NoPlan, Plan
-from planner.planning.planners import DEFAULT_PLANNER, PLANNERS
+from planner.planning.planners import PLANNERS
 from planner.planning.problem import Problem
 from planner.planning.smoothing import smooth
 from planner.planning.verification import verify

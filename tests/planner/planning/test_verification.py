@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
+from planner.defaults import DEFAULT_PLANNER
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.plan import Pause, Plan, make_plan
-from planner.planning.planners import DEFAULT_PLANNER, PLANNERS
+from planner.planning.planners import PLANNERS
 from planner.planning.problem import Problem
 from planner.planning.verification import verify
 from planner.table.motion import Limits, roll_out

@@ -1,0 +1,238 @@
+"""The command line of `python -m planner`: what can be asked, read without loading what carries it out."""
+
+import argparse
+import math
+from pathlib import Path
+
+from planner.defaults import (
+    DEFAULT_PLANNER,
+    LAG_S,
+    LEAD_S,
+    MILLIMETRES,
+    PLANNER_NAMES,
+    PROFILES_HZ,
+    RUN_ON_DEG,
+    TOLERANCE_DEG,
+    shipped_scans,
+)
+from protocol.number_options import number, positive_number, whole_number
+
+_Commands = "argparse._SubParsersAction[argparse.ArgumentParser]"
+REPORT_FILE = "report.html"
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser; what it returns has the name of its command in `command`."""
+    top = argparse.ArgumentParser(
+        prog="python -m planner",
+        description="Plan the motion of a rotary table under a scanning robot arm.",
+        epilog="example: python -m planner map mould --out build/mould",
+    )
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", dest="command", required=True)
+    _add_map(commands)
+    _add_plan(commands)
+    _add_run(commands)
+    _add_scan(commands)
+    _add_show(commands)
+    return top
+
+
+def _add_map(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "map",
+        help="compute and draw a scan's configuration map",
+        description="Rate every location of a scan at every table angle, and say why where the arm cannot be.",
+        epilog="example: python -m planner map mould --configuration LEFTY-ABOVE-NOFLIP --out build/mould",
+    )
+    _add_scan_option(parser)
+    _add_map_option(parser, configuration="all")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the map and its pictures")
+
+
+def _add_plan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "plan",
+        help="plan the table's motion along a scan",
+        description="Choose the table's motion across a scan's configuration map. Exit status 1 where there is none,"
+        " or none that the arm can follow.",
+        epilog="example: python -m planner plan mould --compare --out build/mould",
+    )
+    _add_scan_option(parser)
+    _add_map_option(parser, configuration="best")
+    parser.add_argument(
+        "--planner", choices=list(PLANNER_NAMES), default=DEFAULT_PLANNER, help=f"default: {DEFAULT_PLANNER}"
+    )
+    parser.add_argument("--start", type=_angle, metavar="DEG", help="table angle at the first location (default: free)")
+    parser.add_argument("--smooth", action="store_true", help="lower the plan's acceleration peaks afterwards")
+    parser.add_argument("--compare", action="store_true", help="run all planners and print a table of them")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="folder for plan.json, its pictures and the map"
+    )
+
+
+def _add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "run",
+        help="carry out a plan on a table, and verify the motion",
+        description="Stream a plan to the table at a port; exit status 1 when the motion deviated from the plan.",
+        epilog="example: python -m planner run build/cylinder/plan.json --port /dev/ttyUSB0 --out build/cylinder/run",
+    )
+    parser.add_argument("plan", metavar="PLAN.json", type=Path, help="a plan that python -m planner plan has written")
+    parser.add_argument(
+        "--port",
+        metavar="URL",
+        required=True,
+        help="a device, socket://HOST:PORT, or emulator:// for a simulated table",
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, required=True, help="folder for run.json, run.csv and run.png"
+    )
+    parser.add_argument("--map", metavar="FILE", type=Path, help="the plan's map (default: map.npz beside the plan)")
+    _add_wire(parser)
+    parser.add_argument(
+        "--timeout",
+        type=positive_number,
+        default=1.0,
+        metavar="S",
+        help="wait this long for a reply (default 1)",
+    )
+    parser.add_argument(
+        "--lead", type=number(-1.0, 1.0), default=LEAD_S, metavar="S",
+        help="send commands ahead by the encoder's lag behind the reference: 0.0035 for the stand-in (default 0)",
+    )  # fmt: skip
+    _add_lag(parser)
+    parser.add_argument(
+        "--tolerance", type=positive_number, default=TOLERANCE_DEG, metavar="DEG",
+        help="what the encoder may deviate at a location (default %(default)s)",
+    )  # fmt: skip
+    _add_run_on(parser)
+    parser.add_argument(
+        "--arm-away",
+        action="store_true",
+        help="the arm is drawn back until the table stands at the start: any way there is free",
+    )
+    _add_stand_in(parser)
+
+
+def _add_scan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "scan",
+        help="scan a workpiece with a simulated probe, and compute the error budget of its cloud",
+        description="Plan a scan, move the table, take laser profiles and align them to one cloud; exit status 1 when"
+        " it ended early.",
+        epilog="example: python -m planner scan cylinder --decimals 3 --out build/cylinder",
+    )
+    _add_scan_option(parser)
+    parser.add_argument("--mesh", type=Path, metavar="FILE", help="replace the workpiece by this mesh")
+    parser.add_argument("--unit", choices=tuple(MILLIMETRES), help="unit of length in --mesh (default mm)")
+    parser.add_argument(
+        "--port", metavar="URL", default="emulator://",
+        help="emulator:// for a table in simulated time (the default), or a stand-in's port along with --control",
+    )  # fmt: skip
+    _add_stand_in(parser)
+    _add_wire(parser)
+    _add_lag(parser)
+    parser.add_argument(
+        "--rate", type=positive_number, default=PROFILES_HZ, metavar="HZ",
+        help="profiles a second (default %(default)g)",
+    )  # fmt: skip
+    _add_run_on(parser)
+    _add_map_option(parser, configuration="best")
+    parser.add_argument(
+        "--exact-calibration", action="store_true", help="align with the true placements instead of calibrated ones"
+    )
+    parser.add_argument("--xyz", action="store_true", help="write cloud.xyz as well")
+    parser.add_argument(
+        "--seed", type=whole_number(0, 2**31), default=0, metavar="N", help="chooses all noise (default 0)"
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="folder for cloud.ply, scan.json and report.html"
+    )
+
+
+def _add_show(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "show",
+        help="show a run as one HTML page",
+        description="Write a page that shows a run, with everything in it: map, paths, profile, deviations, commands.",
+        epilog="example: python -m planner show build/cylinder/run",
+    )
+    parser.add_argument("folder", metavar="DIR", type=Path, help="what python -m planner run has written")
+    parser.add_argument("--out", metavar="FILE", type=Path, help=f"the page (default: {REPORT_FILE} in DIR)")
+
+
+def _angle(text: str) -> float:
+    try:
+        angle = float(text)
+    except ValueError:
+        angle = math.nan
+    if not math.isfinite(angle):
+        raise argparse.ArgumentTypeError(f"is {text}; allowed is any angle in degrees")
+    return angle
+
+
+def _add_scan_option(parser: argparse.ArgumentParser) -> None:
+    """Add the scan that the command is about."""
+    parser.add_argument("scan", metavar="SCAN", help=f"a scan file, or one of {', '.join(shipped_scans())}")
+
+
+def _add_map_option(parser: argparse.ArgumentParser, configuration: str) -> None:
+    """Add which configuration maps to compute, and how finely; `configuration` is the default."""
+    parser.add_argument(
+        "--configuration",
+        metavar="NAME",
+        default=configuration,
+        help=f"such as LEFTY-ABOVE-NOFLIP, or {configuration} (the default)",
+    )
+    parser.add_argument(
+        "--angles",
+        type=whole_number(8, 36_000),
+        default=360,
+        metavar="COUNT",
+        help="table angles over one turn (default 360)",
+    )
+
+
+def _add_wire(parser: argparse.ArgumentParser) -> None:
+    """Add what the line to the table is like."""
+    parser.add_argument("--baud", type=whole_number(0, 1_000_000), default=9600, metavar="N", help="default 9600")
+    parser.add_argument(
+        "--decimals",
+        type=whole_number(1, 6),
+        default=1,
+        metavar="N",
+        help="places after the point on the wire (default 1)",
+    )
+
+
+def _add_run_on(parser: argparse.ArgumentParser) -> None:
+    """Add how far the table may run on when the line dies."""
+    parser.add_argument(
+        "--run-on",
+        type=positive_number,
+        default=RUN_ON_DEG,
+        metavar="DEG",
+        help="maximum angle that the table runs on if the line dies, where the limits allow it (default %(default)g)",
+    )
+
+
+def _add_stand_in(parser: argparse.ArgumentParser) -> None:
+    """Add what is to be known of a stand-in at the port."""
+    parser.add_argument(
+        "--time-scale",
+        type=positive_number,
+        default=1.0,
+        metavar="X",
+        help="that of the stand-in at --port, if it is not 1",
+    )
+    parser.add_argument(
+        "--control", type=Path, metavar="PATH", help="the control channel of a stand-in at --port, to see inside it"
+    )
+
+
+def _add_lag(parser: argparse.ArgumentParser) -> None:
+    """Add the encoder's lag behind the reference, which the wire does not show."""
+    parser.add_argument(
+        "--lag", type=number(0.0, 1.0), default=LAG_S, metavar="S",
+        help="lag of the encoder behind the table's reference (default %(default)s, that of the emulator)",
+    )  # fmt: skip

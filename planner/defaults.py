@@ -1,0 +1,43 @@
+"""What a user can choose by name, and what holds where nothing else is asked: known without loading what uses it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+SCANS = Path(__file__).with_name("scans")
+"""The folder of the scans that come with the planner."""
+
+DYNAMIC_PROGRAMMING = "dynamic_programming"
+RECEDING = "receding"
+GUIDED_RAY_SHOOTING = "guided_ray_shooting"
+RAY_SHOOTING = "ray_shooting"
+ROTATE_WHEN_BLOCKED = "rotate_when_blocked"
+DIJKSTRA = "dijkstra"
+LOCAL_MAXIMA = "local_maxima"
+PLANNER_NAMES = (
+    DYNAMIC_PROGRAMMING,
+    RECEDING,
+    GUIDED_RAY_SHOOTING,
+    RAY_SHOOTING,
+    ROTATE_WHEN_BLOCKED,
+    DIJKSTRA,
+    LOCAL_MAXIMA,
+)
+DEFAULT_PLANNER = DYNAMIC_PROGRAMMING
+
+MILLIMETRES: Mapping[str, float] = MappingProxyType({"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4})
+"""The units of length that a mesh file may be in, in mm."""
+
+LAG_S = 0.0035
+"""How long after the reference the encoder is at the same angle: that of the emulator's speed loop."""
+LEAD_S = 0.0
+TOLERANCE_DEG = 0.25
+"""Allowed deviation of the encoder at a location."""
+RUN_ON_DEG = 90.0
+"""How far the table may run on when the line dies."""
+PROFILES_HZ = 25.0
+
+
+def shipped_scans() -> list[str]:
+    """Return the names of the scans that come with the planner."""
+    return sorted(file.stem for file in SCANS.glob("*.toml"))

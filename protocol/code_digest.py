@@ -1,0 +1,133 @@
+"""A digest of what a function computes: its byte code, and whatever that reads, in all files that it comes from.
+
+Comments, docstrings, names of files and numbers of lines are no part of it. Machine code that is kept under this
+digest is therefore compiled anew when, and only when, something has changed that it was made from.
+"""
+
+import dis
+import enum
+import hashlib
+from collections.abc import Iterator
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+_KNOWN_BY_VERSION = frozenset({"builtins", "llvmlite", "math", "numba", "numpy", "operator", "typing"})
+"""Packages whose parts are known by their names: whoever keeps something under a digest adds their versions."""
+
+_LOADS_GLOBAL = frozenset({"LOAD_GLOBAL", "LOAD_NAME"})
+_CONSTANT = (enum.Enum, tuple, list, frozenset, bool, int, float, complex, str, bytes, type(None), type(Ellipsis))
+
+
+class NoDigestError(Exception):
+    """A function reads something that has no digest, such as an open file."""
+
+
+def code_digest(*values: object) -> str:
+    """Return the digest of functions, and of constants, classes and modules as functions use them: 32 hex digits.
+
+    Raises:
+        NoDigestError: A function reads a value of another kind.
+    """
+    content = hashlib.sha256()
+    for part in _Walk().parts(values):
+        content.update(f"{len(part)}:{part}".encode())
+    return content.hexdigest()[:32]
+
+
+class _Walk:
+    """A walk through all that functions read; what was met before is known by its number."""
+
+    def __init__(self) -> None:
+        self._met: dict[int, int] = {}
+
+    def parts(self, value: Any) -> Iterator[str]:  # noqa: ANN401  # whatever a function may read
+        """Yield texts that tell a value from all others."""
+        function = getattr(value, "py_func", value)  # of a compiled function, its source
+        if isinstance(value, _CONSTANT):
+            yield from self._constant_parts(value)
+        elif _is_known_by_version(value):
+            yield f"known {_full_name(value)}"
+        elif id(function) in self._met:
+            yield f"met {self._met[id(function)]}"
+        elif isinstance(function, FunctionType | type):
+            self._met[id(function)] = len(self._met)
+            yield from (
+                self._function_parts(function) if isinstance(function, FunctionType) else self._class_parts(value)
+            )
+        elif hasattr(value, "dtype") and hasattr(value, "tobytes"):
+            yield f"array {value.dtype} {value.shape} {value.tobytes().hex()}"
+        else:
+            raise NoDigestError(f"{value!r} has no digest")
+
+    def _constant_parts(self, value: Any) -> Iterator[str]:  # noqa: ANN401  # one of `_CONSTANT`
+        if isinstance(value, enum.Enum):
+            yield f"member {value.name} {value.value!r}"
+        elif isinstance(value, tuple | list):
+            yield f"{type(value).__name__} {len(value)}"
+            if type(value) not in {tuple, list}:
+                yield from self.parts(type(value))
+            for item in value:
+                yield from self.parts(item)
+        elif isinstance(value, frozenset):
+            yield from self.parts(sorted(map(repr, value)))
+        else:
+            yield f"{type(value).__name__} {value!r}"
+
+    def _function_parts(self, function: FunctionType) -> Iterator[str]:
+        yield f"function {function.__name__}"
+        yield from self.parts(function.__defaults__)
+        yield from self.parts(tuple(sorted((function.__kwdefaults__ or {}).items())))
+        for cell in function.__closure__ or ():
+            yield from self.parts(cell.cell_contents)
+        yield from self._code_parts(function.__code__, function.__globals__)
+
+    def _code_parts(self, code: CodeType, names: dict[str, Any]) -> Iterator[str]:
+        yield code.co_code.hex()
+        yield f"{code.co_exceptiontable.hex()} {code.co_flags}"
+        yield f"{code.co_argcount} {code.co_posonlyargcount} {code.co_kwonlyargcount}"
+        for each in (code.co_names, code.co_varnames, code.co_cellvars, code.co_freevars):
+            yield from self.parts(each)
+        instructions = list(dis.get_instructions(code))
+        loaded = {each.arg for each in instructions if each.opcode in dis.hasconst}
+        for number, constant in enumerate(code.co_consts):
+            if isinstance(constant, CodeType):
+                yield from self._code_parts(constant, names)
+            elif number in loaded:  # a docstring is not
+                yield from self.parts(constant)
+        for name in sorted({str(each.argval) for each in instructions if each.opname in _LOADS_GLOBAL}):
+            yield f"global {name}"
+            if name in names:
+                yield from self._read_parts(names[name], code)
+
+    def _read_parts(self, value: object, code: CodeType) -> Iterator[str]:
+        """Yield the parts of a global; of a module, those that the code may read."""
+        if not isinstance(value, ModuleType) or _is_known_by_version(value):
+            yield from self.parts(value)
+            return
+        yield f"module {value.__name__}"
+        for name in sorted({name for name in code.co_names if hasattr(value, name)}):
+            yield f"attribute {name}"
+            yield from self._read_parts(getattr(value, name), code)
+
+    def _class_parts(self, kind: type) -> Iterator[str]:
+        yield f"class {kind.__qualname__}"
+        if issubclass(kind, enum.Enum):
+            yield from self.parts(tuple((name, member.value) for name, member in kind.__members__.items()))
+        elif issubclass(kind, tuple) and hasattr(kind, "_fields"):
+            named: Any = kind
+            yield from self.parts((*named._fields, *sorted(named._field_defaults.items())))
+        else:
+            raise NoDigestError(f"{kind!r} has no digest")
+
+
+def _is_known_by_version(value: object) -> bool:
+    return _full_name(value).partition(".")[0] in _KNOWN_BY_VERSION
+
+
+def _full_name(value: object) -> str:
+    """Return the name of a module, function or class, or else an empty one."""
+    if isinstance(value, ModuleType):
+        return value.__name__
+    if callable(value):
+        return f"{getattr(value, '__module__', None) or type(value).__module__}.{getattr(value, '__name__', '')}"
+    return ""

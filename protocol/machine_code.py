@@ -1,0 +1,118 @@
+"""Compile functions with numba, and keep their machine code between runs under what they are (`code_digest`).
+
+Numba's own cache asks only whether the file of the *called* function has changed, so it would go on running old code of
+a function that is called in another file; and two processes that compile at once may exchange two signatures' code.
+This module needs numba; nothing imports it before something has to be compiled.
+"""
+
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numba.core.types
+from numba.core import config
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
+from numba.core.datamodel.models import OpaqueModel
+from numba.core.datamodel.registry import register_default
+from numba.core.serialize import dumps
+
+from protocol.code_digest import NoDigestError, code_digest
+from protocol.kept_code import code_folder, code_name, keep_code, load_code
+
+_types: Any = numba.core.types
+_OPTIONS = {"error_model": "numpy", "nogil": True}
+"""No Python objects, no bounds checks, IEEE arithmetic (no fast-math, no fused operations)."""
+
+
+def compiled(function: Callable[..., Any]) -> Any:  # noqa: ANN401  # numba's dispatcher
+    """Return `function` compiled at its first call, or taken from an earlier run of the same code."""
+    dispatcher = numba.njit(**_OPTIONS)(function)
+    dispatcher._cache = _KeptCode(function)  # noqa: SLF001  # as numba's `enable_caching` does
+    return dispatcher
+
+
+def within_type(function: Callable[..., Any]) -> Any:  # noqa: ANN401  # numba's type
+    """Return the type of `function` for compiled callers only: it has no wrapper for Python, and is not kept alone."""
+    return _Within(numba.njit(**_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function))
+
+
+class _Within(_types.Dispatcher):  # type: ignore[misc]  # numba has no types
+    """A compiled function that compiled ones call; an argument that is a constant gets no code of its own."""
+
+    def __init__(self, dispatcher: Any) -> None:  # noqa: ANN401  # numba's
+        super().__init__(dispatcher)
+        self._kept_alive = dispatcher  # numba's type holds it weakly
+
+    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:  # noqa: ANN401  # numba's
+        args = tuple(map(_types.unliteral, args))
+        return super().get_call_type(context, args, {name: _types.unliteral(kind) for name, kind in kws.items()})
+
+
+register_default(_Within)(OpaqueModel)
+
+
+class _KeptCode(_Cache):  # type: ignore[misc]  # numba has no types
+    """The machine code of one function, a file for each of its signatures."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self._compiling: str | None = None
+
+    @property
+    def cache_path(self) -> str:
+        return str(code_folder())
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:  # noqa: ANN401  # numba's
+        target_context.refresh()
+        self._compiling = self._file_name(sig, target_context)
+        code = None if self._compiling is None else load_code(self._compiling)
+        return None if code is None else CompileResult._rebuild(target_context, *pickle.loads(code))  # noqa: S301, SLF001  # its digest was compared
+
+    def save_overload(self, sig: Any, data: Any) -> None:  # noqa: ANN401  # numba's
+        """Keep what was compiled, under the name that was not found just before."""
+        if self._compiling is None or data.lifted or data.library.has_dynamic_globals:
+            return
+        if self._compiling == self._file_name(sig, data.target_context):  # no global was changed meanwhile
+            keep_code(self._compiling, dumps(data._reduce()))  # noqa: SLF001  # as numba's own cache does
+
+    def enable(self) -> None:
+        """It always is."""
+
+    def disable(self) -> None:
+        """It never is."""
+
+    def flush(self) -> None:
+        """Nothing is ever stale."""
+
+    def _file_name(self, sig: Any, target_context: Any) -> str | None:  # noqa: ANN401  # numba's
+        name = code_name(self._function)
+        target = (str(target_context.codegen().magic_tuple()), *_OPTIONS.items())
+        settings = (config.OPT, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT)
+        try:
+            digest = code_digest(target, settings, *map(_type_parts, getattr(sig, "args", sig)))
+        except NoDigestError:
+            return None
+        return None if name is None else f"{name}-{digest[:16]}"
+
+
+_PLAIN_TYPES = (
+    _types.Number,
+    _types.Boolean,
+    _types.Array,
+    _types.NoneType,
+    _types.Literal,
+    _types.Omitted,
+    _types.UnicodeType,
+)
+
+
+def _type_parts(kind: Any) -> tuple[Any, ...]:  # noqa: ANN401  # numba's
+    """Return what tells a type from all others."""
+    if isinstance(kind, _types.BaseTuple):
+        named = (kind.instance_class.__module__, kind.instance_class) if isinstance(kind, _types.BaseNamedTuple) else ()
+        return (type(kind).__name__, named, *map(_type_parts, kind.types))
+    if isinstance(kind, _PLAIN_TYPES):
+        return (type(kind).__name__, str(kind))
+    raise NoDigestError(f"{kind} has no digest")

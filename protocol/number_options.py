@@ -1,0 +1,45 @@
+"""The numbers that options of a command line take: each reader refuses others with what is allowed."""
+
+import argparse
+from collections.abc import Callable
+
+
+def whole_number(least: int, most: int) -> Callable[[str], int]:
+    """Return what reads a whole number within bounds."""
+
+    def read(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            number = least - 1
+        if not least <= number <= most:
+            raise argparse.ArgumentTypeError(f"is {text}; allowed is a whole number from {least} to {most}")
+        return number
+
+    return read
+
+
+def number(least: float, most: float) -> Callable[[str], float]:
+    """Return what reads a number within bounds."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = float("nan")
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"is {text}; allowed is a number from {least:g} to {most:g}")
+        return value
+
+    return read
+
+
+def positive_number(text: str) -> float:
+    """Return a number above 0, and not beyond anything that can be meant."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0.0 < number <= 1000.0:
+        raise argparse.ArgumentTypeError(f"is {text}; allowed is a number above 0 and at most 1000")
+    return number

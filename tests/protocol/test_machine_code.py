@@ -1,0 +1,224 @@
+"""Machine code is kept under what it is: a small package is edited, and each run says how much was compiled."""
+
+import errno
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from protocol import kept_code
+from protocol.kept_code import UNUSED_DAYS, code_folder, keep_code, load_code
+
+ROOT = Path(__file__).parents[2]
+
+PARTS = """
+from typing import NamedTuple
+STEP = 1.0
+
+class Pair(NamedTuple):
+    first: float
+    second: float
+
+def added(number, more=10.0):
+    return number + more + STEP
+"""
+WHOLE = """
+from numba.core import event
+from parts import Pair, added
+from planner.kernel import kernel
+from protocol.machine_code import compiled
+
+added = kernel(added)
+
+@kernel
+def whole(pair):
+    return added(pair.first) - pair.second  # a comment
+
+class Counter(event.Listener):
+    count = 0
+    def on_start(self, _event):
+        self.count += 1
+    def on_end(self, _event):
+        pass
+
+counter = Counter()
+event.register("numba:compile", counter)
+print(whole(Pair(3.0, 1.0)), counter.count)
+"""
+
+
+class Checkout:
+    """A copy of the package, and how it is run."""
+
+    def __init__(self, folder: Path, cache: Path) -> None:
+        folder.mkdir()
+        self.folder, self.cache = folder, cache
+        (folder / "parts.py").write_text(PARTS)
+        (folder / "whole.py").write_text(WHOLE)
+
+    def edit(self, file: str, old: str, new: str) -> None:
+        text = (self.folder / file).read_text()
+        assert old in text
+        (self.folder / file).write_text(text.replace(old, new))
+
+    def start(self) -> "subprocess.Popen[str]":
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(self.cache)}
+        environment.pop("NUMBA_CACHE_DIR", None)
+        return subprocess.Popen(
+            [sys.executable, "-B", "whole.py"], cwd=self.folder, env=environment, stdout=subprocess.PIPE, text=True
+        )
+
+    def run(self) -> tuple[float, int]:
+        """Return what the kernel gives, and how many functions were compiled for that."""
+        return result_of(self.start())
+
+
+def result_of(process: "subprocess.Popen[str]") -> tuple[float, int]:
+    output, _ = process.communicate(timeout=120)
+    assert process.returncode == 0
+    number, count = output.split()
+    return float(number), int(count)
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Checkout:
+    return Checkout(tmp_path / "one", tmp_path / "cache")
+
+
+def kept_files(checkout: Checkout) -> list[Path]:
+    return [file for file in checkout.cache.rglob("*") if file.is_file()]
+
+
+def test_code_is_compiled_once_and_again_only_when_it_has_changed(checkout: Checkout, tmp_path: Path) -> None:
+    assert checkout.run() == (13.0, 2)
+    checkout.edit("whole.py", "# a comment", "# another\n")
+    assert checkout.run() == (13.0, 0)
+    other = Checkout(tmp_path / "other", checkout.cache)
+    other.edit("parts.py", "STEP = 1.0", "STEP = 2.0")
+    assert other.run() == (14.0, 2)
+    assert checkout.run() == (13.0, 0)  # two checkouts in turn
+    assert other.run() == (14.0, 0)
+    assert len(kept_files(checkout)) == 2
+    other.edit("parts.py", "more=10.0", "more=20.0")
+    assert other.run() == (24.0, 2)
+    other.edit("parts.py", "first: float\n    second: float", "second: float\n    first: float")
+    assert other.run() == (20.0, 2)
+
+
+def test_a_damaged_file_is_replaced(checkout: Checkout) -> None:
+    checkout.run()
+    [file] = kept_files(checkout)
+    whole = file.read_bytes()
+    file.write_bytes(whole[: len(whole) // 2])
+    assert checkout.run() == (13.0, 2)
+    assert len(file.read_bytes()) > len(whole) // 2
+    assert checkout.run() == (13.0, 0)
+
+
+def test_without_a_folder_that_can_be_written_code_is_compiled_each_time(checkout: Checkout) -> None:
+    checkout.cache.write_text("a file in the place of the folder")
+    assert checkout.run() == (13.0, 2)
+    assert checkout.run() == (13.0, 2)
+
+
+def test_processes_that_compile_at_once_leave_one_whole_file(checkout: Checkout) -> None:
+    processes = [checkout.start() for _ in range(3)]
+    assert {result_of(process)[0] for process in processes} == {13.0}
+    assert len(kept_files(checkout)) == 1
+    assert checkout.run() == (13.0, 0)
+
+
+@pytest.fixture
+def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    kept_code.prune.cache_clear()
+
+
+@pytest.mark.usefixtures("_own_cache")
+def test_what_was_kept_is_loaded_and_nothing_else(tmp_path: Path) -> None:
+    assert code_folder().is_relative_to(tmp_path)
+    keep_code("a", b"machine code")
+    assert load_code("a") == b"machine code"
+    assert load_code("b") is None
+    [file] = code_folder().iterdir()
+    content = bytearray(file.read_bytes())
+    content[-1] ^= 1
+    file.write_bytes(content)
+    assert load_code("a") is None
+
+
+@pytest.mark.usefixtures("_own_cache")
+def test_a_full_disk_costs_nothing_but_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_file: Path, _content: bytes) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    keep_code("a", b"machine code")
+    assert load_code("a") is None
+    assert list(code_folder().iterdir()) == []
+
+
+@pytest.mark.usefixtures("_own_cache")
+def test_code_that_no_run_has_used_for_long_is_deleted(tmp_path: Path) -> None:
+    long_ago = time.time() - (UNUSED_DAYS + 1) * 86_400
+    old_layout = tmp_path / "seventh-axis" / "0123456789abcdef" / "geometry_0"
+    old_layout.mkdir(parents=True)
+    foreign = tmp_path / "other" / "their.nbc"
+    foreign.parent.mkdir()
+    for name in ("used", "unused"):
+        keep_code(name, b"code")
+    for file in (*code_folder().iterdir(), old_layout / "old.nbc", old_layout / "old.nbi", foreign):
+        file.touch()
+        os.utime(file, (long_ago, long_ago))
+    assert load_code("used") == b"code"
+    kept_code.prune.cache_clear()
+    keep_code("new", b"code")
+    assert {file.stem for file in code_folder().iterdir()} == {"used", "new"}
+    assert list(old_layout.iterdir()) == []
+    assert foreign.exists()
+
+
+LISTING = """
+import importlib, pkgutil, sys
+import planner
+from planner.kernel import _Kernel
+from protocol.kept_code import code_name
+for module in pkgutil.walk_packages(planner.__path__, "planner."):
+    if not module.name.endswith("__main__"):
+        for name, value in sorted(vars(importlib.import_module(module.name)).items()):
+            if isinstance(value, _Kernel) and value.py_func.__module__ == module.name:
+                print(module.name, name, code_name(value.py_func))
+assert "numba" not in sys.modules
+"""
+
+
+def names_of_kernels(root: Path) -> dict[str, str]:
+    environment = {**os.environ, "PYTHONPATH": str(root)}
+    run = [sys.executable, "-B", "-c", LISTING]
+    output = subprocess.run(run, cwd=root, env=environment, capture_output=True, text=True, check=True).stdout
+    return {line.rpartition(" ")[0]: line.rpartition(" ")[2] for line in output.splitlines()}
+
+
+def test_every_kernel_of_the_planner_is_kept_whatever_is_said_about_it(tmp_path: Path) -> None:
+    before = names_of_kernels(ROOT)
+    assert len(before) > 100
+    assert "None" not in before.values()
+    for package in ("planner", "protocol"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    for source in (tmp_path / "planner").rglob("*.py"):
+        source.write_text("# A comment.\n" + source.read_text(encoding="utf-8").replace('"""Return ', '"""Give '))
+    bodies = tmp_path / "planner/cell/bodies.py"
+    bodies.write_text(bodies.read_text() + "\n\nUNUSED = 1\n")
+    capsule = tmp_path / "planner/geometry/capsule.py"
+    text = capsule.read_text()
+    assert "0.0" in text
+    capsule.write_text(text.replace("0.0", "1e-300"))
+    after = names_of_kernels(tmp_path)
+    changed = {name for name in before if before[name] != after[name]}
+    assert "planner.geometry.capsule segment_distance" in changed
+    assert "planner.map.map_builder _rate_columns" in changed
+    assert not [name for name in changed if "planner.planning" in name or "planner.table" in name]
