@@ -6,6 +6,9 @@ from typing import TextIO
 Progress = Callable[[int, int], None]
 """Called with the work done and all work, in any unit."""
 
+ProgressOf = Callable[[str], Progress | None]
+"""Gives the progress of a kind of work."""
+
 _WIPE = "\r\x1b[K"
 
 

@@ -12,7 +12,7 @@ from planner.commands import options
 from planner.errors import PlannerError
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
-from planner.map.map_builder import build_maps
+from planner.map.map_builder import build_maps, is_compiled
 from planner.map.map_file import MAP_FILE, save_maps
 from planner.map.map_plots import plot_map, plot_map_cylinder
 from planner.map.map_problem import map_problem
@@ -30,7 +30,8 @@ def run(arguments: argparse.Namespace) -> int:
     )
     scan = load_scan(arguments.scan, options.say, progress_line("mesh", sys.stderr))
     problem = map_problem(scan, progress_line("distance field", sys.stderr))
-    maps = build_maps(problem, configurations, arguments.angles, progress_line("map", sys.stderr))
+    label = "map" if is_compiled() else "map (compiling, once)"
+    maps = build_maps(problem, configurations, arguments.angles, progress_line(label, sys.stderr))
     drawn = most_reachable(maps)
     out: Path = arguments.out
     try:

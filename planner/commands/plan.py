@@ -14,19 +14,15 @@ from planner.commands import options
 from planner.errors import PlannerError
 from planner.execution.run_file import PLAN_FILE, RUN_RESULTS
 from planner.kinematics.configuration import Configuration
-from planner.map.config_map import ConfigurationMap
-from planner.map.map_builder import build_maps
 from planner.map.map_file import MAP_FILE, save_maps
-from planner.map.map_problem import map_problem
-from planner.planning.arm_motion import ArmMotion, arm_follows, arm_motion
-from planner.planning.arm_on_path import arm_on_path
+from planner.planning.arm_motion import ArmMotion, arm_follows
 from planner.planning.arm_plots import plot_arm
-from planner.planning.best_configuration import best_configuration
 from planner.planning.plan import NoPlan, Outcome, Plan, Planner
 from planner.planning.plan_file import plan_document, save_plan
 from planner.planning.plan_plots import plot_plan
 from planner.planning.planners import PLANNERS
 from planner.planning.problem import Problem
+from planner.planning.scan_planning import plan_scan
 from planner.planning.smoothing import smooth
 from planner.planning.verification import verify
 from planner.progress import progress_line
@@ -40,43 +36,29 @@ PLAN_RESULTS = (PLAN_FILE, "plan.png", "arm.png", MAP_FILE, *RUN_RESULTS)
 def run(arguments: argparse.Namespace) -> int:
     """Write plan, map and pictures, print cost, time and margins, and return the exit status."""
     set_aside(arguments.out, PLAN_RESULTS)
-    best = arguments.configuration == "best"
-    asked = list(Configuration) if best else [Configuration.parse(arguments.configuration)]
     scan = load_scan(arguments.scan, options.say, progress_line("mesh", sys.stderr))
-    problem = map_problem(scan, progress_line("distance field", sys.stderr))
-    maps = build_maps(problem, asked, arguments.angles, progress_line("map", sys.stderr))
-    problems = {configuration.label: problem_of(scan, each, arguments.start) for configuration, each in maps.items()}
     planner = PLANNERS[arguments.planner]
-    chosen_planner = timed(smoothed(planner) if arguments.smooth else planner)
-    comparison = best_configuration(problems, chosen_planner, progress_line("plan", sys.stderr))
-    for label, outcome in comparison.outcomes.items():
+    plans = plan_scan(
+        scan,
+        arguments.configuration,
+        arguments.angles,
+        timed(smoothed(planner) if arguments.smooth else planner),
+        lambda label: progress_line(label, sys.stderr),
+        arguments.start,
+        compiled=arguments.planner,
+    )
+    for label, outcome in plans.comparison.outcomes.items():
         sys.stderr.write(configuration_line(label, outcome))
-    if comparison.best is None:
-        sys.stdout.write(f"{comparison.why_no_plan(scan)}\n")
+    if plans.best is None:
+        sys.stdout.write(f"{plans.comparison.why_no_plan(scan)}\n")
         return _NO_PLAN
-    chosen, plan = problems[comparison.best], comparison.outcomes[comparison.best]
-    assert isinstance(plan, Plan)
-    assert chosen.arm is not None
-    motion = arm_motion(chosen.arm, plan)
+    chosen, plan, motion = plans.best
     _write(arguments.out, scan, chosen, plan, motion)
     sys.stdout.write(report(scan, chosen, plan, motion))
     if arguments.compare:
         start = replace(chosen, start_angle_deg=float(plan.angles_deg[0]))
         sys.stdout.write(comparison_table(start, {name: timed(planner)(start) for name, planner in PLANNERS.items()}))
     return 0 if motion.step is None and verify(chosen, plan).is_executable else _NO_PLAN
-
-
-def problem_of(scan: Scan, configuration_map: ConfigurationMap, start_angle_deg: float | None) -> Problem:
-    """Return the planning problem of a scan in one configuration, from rest."""
-    configuration = Configuration.parse(str(configuration_map.metadata["configuration"]))
-    return Problem(
-        configuration_map,
-        scan.path.step_s,
-        scan.limits,
-        scan.weights,
-        start_angle_deg,
-        arm=arm_on_path(scan, configuration),
-    )
 
 
 def smoothed(planner: Planner) -> Planner:

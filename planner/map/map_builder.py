@@ -38,6 +38,7 @@ from planner.map.map_problem import MapProblem
 from planner.map.map_reasons import FIRST_PAIR, FIRST_USER_FACTOR, reason_texts
 from planner.progress import Progress
 from planner.reasons import Reason
+from protocol.kept_code import is_kept
 
 _REACHED = int(Reason.REACHED)
 _SINGULAR = int(Reason.SINGULAR)
@@ -107,6 +108,11 @@ def build_maps(
         )
         for c, configuration in enumerate(configurations)
     }
+
+
+def is_compiled() -> bool:
+    """Return whether the machine code of a map is kept from an earlier run."""
+    return is_kept(_rate_columns)
 
 
 class _Cells(NamedTuple):
@@ -241,7 +247,8 @@ def _rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between 
                 reasons[c, column, angle] = reason
                 if clearance_seen.size > 0:
                     clearance_seen[c, column, angle] = clearance_mm
-                    joints_seen[c, column, angle] = joints[slot]
+                    for joint in range(6):  # the assignment of rows brings its texts of errors into the machine code
+                        joints_seen[c, column, angle, joint] = joints[slot, joint]
 
 
 @kernel

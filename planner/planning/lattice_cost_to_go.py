@@ -60,7 +60,9 @@ def _subtract_least(costs: CostArray, least: CostArray) -> None:
     for s in range(len(costs)):
         for m in range(len(least)):
             least[m] = min(least[m], costs[s, m])
-    subtracted = min(least.min(), ANY_COST)
+    subtracted = ANY_COST
+    for m in range(len(least)):
+        subtracted = min(subtracted, least[m])
     for s in range(len(costs)):
         for m in range(len(least)):
             costs[s, m] = costs[s, m] - subtracted if costs[s, m] < ANY_COST else UNREACHABLE

@@ -4,7 +4,6 @@ The workpiece is measured where it truly is, at the table's true angle, and alig
 difference is the error that the account takes apart.
 """
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,18 +25,12 @@ from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_motion import TableMotion
 from planner.execution.table_port import open_port
 from planner.geometry.ray_casting import RayCaster
-from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
-from planner.map.map_builder import build_maps
-from planner.map.map_problem import map_problem
 from planner.planning.arm_check import PlannedArm, arm_fault
-from planner.planning.arm_motion import arm_motion
-from planner.planning.arm_on_path import arm_on_path
-from planner.planning.best_configuration import best_configuration
 from planner.planning.plan import Plan
 from planner.planning.planners import PLANNERS
-from planner.planning.problem import Problem
-from planner.progress import Progress
+from planner.planning.scan_planning import plan_scan
+from planner.progress import Progress, ProgressOf
 from planner.scanning.alignment import Calibration, aligned, probe_poses
 from planner.scanning.calibration import AxisCalibration, PartSize
 from planner.scanning.coverage import Coverage
@@ -56,9 +49,6 @@ from protocol import TableClient
 _BLOCK = 64
 # Profiles that are nearer to one another leave no gap.
 COVERED_MM = 2.0
-
-ProgressOf = Callable[[str], Progress | None]
-"""Gives the progress of a kind of work."""
 
 
 class ScanError(PlannerError):
@@ -151,29 +141,20 @@ class Scanned:
         return self.run.failure is None and not self.is_interrupted
 
 
-def plan_scan(scan: Scan, configuration: str, angle_count: int, progress: ProgressOf) -> Planned:
+def planned_scan(scan: Scan, configuration: str, angle_count: int, progress: ProgressOf) -> Planned:
     """Return the best motion for a scan.
 
     Raises:
         ScanError: There is none that the arm can follow.
     """
-    asked = list(Configuration) if configuration == "best" else [Configuration.parse(configuration)]
-    maps = build_maps(map_problem(scan, progress("distance field")), asked, angle_count, progress("map"))
-    problems = {
-        each.label: Problem(map_, scan.path.step_s, scan.limits, scan.weights, arm=arm_on_path(scan, each))
-        for each, map_ in maps.items()
-    }
-    comparison = best_configuration(problems, PLANNERS[DEFAULT_PLANNER], progress("plan"))
-    if comparison.best is None:
-        raise ScanError(comparison.why_no_plan(scan))
-    plan, on_path = comparison.outcomes[comparison.best], problems[comparison.best].arm
-    assert isinstance(plan, Plan)
-    assert on_path is not None
-    joints_deg = arm_motion(on_path, plan).robot_deg
-    fault = arm_fault(PlannedArm(scan.cell, scan.path.T_WS, joints_deg), plan)
+    plans = plan_scan(scan, configuration, angle_count, PLANNERS[DEFAULT_PLANNER], progress, compiled=DEFAULT_PLANNER)
+    if plans.best is None:
+        raise ScanError(plans.comparison.why_no_plan(scan))
+    problem, plan, motion = plans.best
+    fault = arm_fault(PlannedArm(scan.cell, scan.path.T_WS, motion.robot_deg), plan)
     if fault is not None:
         raise ScanError(f"{scan.name}: the arm cannot follow the plan: {fault}")
-    return Planned(plan, joints_deg, scan.limits, maps[Configuration.parse(comparison.best)])
+    return Planned(plan, motion.robot_deg, scan.limits, problem.map)
 
 
 def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) -> LatchedRun:
@@ -237,7 +218,7 @@ def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: Progre
             f"a rate of {options.triggers.rate_hz:g} profiles a second is beyond the probe's {probe.line_rate_hz:g}"
         )
     knowledge = Knowledge.of(scan, probe, options.exact_calibration, options.seed)
-    planned = plan_scan(scan, options.configuration, options.angle_count, progress)
+    planned = planned_scan(scan, options.configuration, options.angle_count, progress)
     out.mkdir(parents=True, exist_ok=True)
     run = run_on_port(planned, options, progress)
     arm = scan.cell.arm

@@ -191,7 +191,12 @@ def test_a_port_that_is_taken_is_refused() -> None:
         (["--pty", "--baud", "fast"], "--baud"),
         (["--pty", "--time-scale", "0"], "--time-scale"),
         (["--pty", "--time-scale", "nan"], "--time-scale"),
+        (["--pty", "--time-scale", "inf"], "--time-scale"),
         (["--pty", "--trigger-hz", "1e9"], "--trigger-hz"),
+        *(
+            (["--pty", "--trigger-hz", text], f"--trigger-hz: {text!r} is not a number from 0")
+            for text in ("inf", "nan", "-1", "x")
+        ),
         (["--pty", "--decimals", "99"], "decimals"),
         (["--tcp", "70000"], "--tcp"),
         (["--tcp", "192.0.2.1:7000"], "192.0.2.1"),

@@ -12,7 +12,6 @@ from typing import NamedTuple, TextIO
 import numpy as np
 
 from planner.cell.scan import load_scan
-from planner.commands.plan import problem_of
 from planner.defaults import shipped_scans
 from planner.kinematics.configuration import Configuration
 from planner.map.map_builder import build_maps
@@ -28,6 +27,7 @@ from planner.planning.planners import PLANNERS
 from planner.planning.problem import Problem
 from planner.planning.ray_shooting import Rays, ray_shooting
 from planner.planning.receding import FAST_SPEED_COUNT, SPEED_COUNT, online_step, prepare_online_step, receding
+from planner.planning.scan_problem import scan_problem
 from planner.planning.smoothing import smooth
 from planner.planning.state_grid import Grid
 from planner.planning.verification import verify
@@ -146,7 +146,7 @@ def _bench_scans(stream: TextIO) -> None:
     for name in shipped_scans():
         scan = load_scan(name)
         maps = build_maps(map_problem(scan), [Configuration.LEFTY_ABOVE_NOFLIP], 100)
-        _print_comparison(f"shipped scan {name}", [problem_of(scan, each, None) for each in maps.values()], stream)
+        _print_comparison(f"shipped scan {name}", [scan_problem(scan, each, None) for each in maps.values()], stream)
 
 
 def _print_comparison(name: str, problems: Sequence[Problem], stream: TextIO) -> None:

@@ -93,6 +93,21 @@ def test_a_saturated_duty_comes_down_as_soon_as_the_error_turns(gains: Gains, ex
     assert step(parameters, state, HOLD, error_after, 0).duty < 1023
 
 
+@given(gains=gains, sign=st.sampled_from([-1, 1]), excess=st.integers(1, 100), ticks=st.integers(1, 50))
+def test_a_duty_that_the_error_alone_saturates_adds_nothing_to_the_integral(
+    gains: Gains, sign: int, excess: int, ticks: int
+) -> None:
+    """Anti-windup, at both ends: then the duty follows the error as soon as that is small again."""
+    assume(gains.proportional > 0)
+    error = sign * (1023 * ONE_STEP // gains.proportional + excess)
+    assume(abs(error) < 8000 * COUNT)
+    parameters, state = regulator(gains), REST
+    for _ in range(ticks):
+        state = step(parameters, state, HOLD, error, 0)
+        assert (state.duty, state.integral) == (sign * 1023, 0)
+    assert step(parameters, state, HOLD, 0, 0).duty == 0
+
+
 @given(gains=gains, step_of_demand=st.integers(-50 * COUNT, 50 * COUNT))
 def test_a_step_of_the_reference_gives_no_derivative_kick(gains: Gains, step_of_demand: int) -> None:
     without = gains._replace(derivative=0)

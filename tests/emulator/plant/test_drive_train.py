@@ -198,3 +198,19 @@ def test_the_table_is_at_most_half_the_backlash_from_where_the_motor_says(
             gap_rad = state.angle_rad / train.ratio - state.table_angle_rad
             assert abs(gap_rad) <= train.half_gap_rad + 1e-12
             assert state.contact == 0 or gap_rad == pytest.approx(state.contact * train.half_gap_rad, abs=1e-12)
+
+
+@given(speed_rad_s=st.floats(1e-4, 0.02), load_Nm=st.floats(0.0, 2.0), direction=st.sampled_from([-1, 1]))
+def test_a_table_that_coasts_within_the_gap_stops_after_the_way_that_its_friction_takes(
+    speed_rad_s: float, load_Nm: float, direction: int
+) -> None:
+    """v^2 / 2a, to the last tick: the deceleration is constant, and the tick in which it stops is a part of one."""
+    train = drive_constants(configured(backlash_arcmin=3000.0))
+    deceleration = (train.bearing_friction_Nm + load_Nm) / train.table_inertia_kg_m2
+    state = at_standstill(train, 0.0)._replace(table_speed_rad_s=direction * speed_rad_s)
+    begun_rad = state.table_angle_rad
+    while state.table_speed_rad_s != 0.0:
+        state = step(train, state, 0.0, direction * load_Nm)
+        assert state.contact == 0
+    way_rad = direction * (state.table_angle_rad - begun_rad)
+    assert way_rad == pytest.approx(speed_rad_s**2 / (2.0 * deceleration), rel=1e-9)

@@ -102,6 +102,11 @@ def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
             "[cell.probe]\nline_width_mm = 1e-6\n[cell]",
             "the pattern has more than 1,000 strips; is the",
         ),
+        *(
+            ("[cell]", f"[cell.table]\n{key} = {number}\n[cell]", f"cell.table.{key} is {number}; it must be a finite")
+            for key in ("radius_mm", "thickness_mm", "plinth_radius_mm")
+            for number in ("0", "-1", "inf")
+        ),
         ("[limits]", "[limits", "is not TOML"),
         (
             "diameter_mm = 160",

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from planner.cell.scan import Scan, load_scan
-from planner.commands.plan import problem_of
 from planner.kinematics.configuration import Configuration
 from planner.kinematics.inverse_kinematics import inverse_kinematics
 from planner.map.map_builder import build_maps
@@ -13,6 +12,7 @@ from planner.planning.arm_motion import arm_motion
 from planner.planning.arm_on_path import arm_on_path
 from planner.planning.plan import Plan
 from planner.planning.rotate_when_blocked import rotate_when_blocked
+from planner.planning.scan_problem import scan_problem
 
 CONFIGURATION = Configuration.LEFTY_ABOVE_NOFLIP
 
@@ -26,7 +26,7 @@ def scan() -> Scan:
 def plan(scan: Scan) -> Plan:
     """A plan with a pause at nearly every location, over more than one turn."""
     configuration_map = build_maps(map_problem(scan), [CONFIGURATION], 60)[CONFIGURATION]
-    outcome = rotate_when_blocked(problem_of(scan, configuration_map, None))
+    outcome = rotate_when_blocked(scan_problem(scan, configuration_map, None))
     assert isinstance(outcome, Plan)
     assert len(outcome.pauses) > 10
     return outcome

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from planner.cell.cell import placement
 from planner.cell.scan import load_scan
 from planner.cell.scan_path import ScanPath
-from planner.commands.plan import problem_of, smoothed
+from planner.commands.plan import smoothed
 from planner.defaults import DEFAULT_PLANNER
 from planner.geometry.transforms import rotations_z
 from planner.kinematics.configuration import Configuration
@@ -26,6 +26,7 @@ from planner.planning.joint_turns import Margin
 from planner.planning.plan import Infeasibility, NoPlan, Plan
 from planner.planning.planners import PLANNERS
 from planner.planning.problem import Problem
+from planner.planning.scan_problem import scan_problem
 from planner.planning.smoothing import smooth
 from planner.planning.verification import verify
 from planner.table.motion import Limits, roll_out
@@ -151,7 +152,7 @@ def test_a_real_scan_with_a_rolling_probe_is_followed_or_refused(
     cell = replace(scan.cell, T_BT=placement(*table_mm, 0.0, 0.0, 0.0))
     scan = replace(scan, cell=cell, path=ScanPath(rolled, 1.0))
     configuration = Configuration.LEFTY_ABOVE_NOFLIP
-    problem = problem_of(scan, build_maps(map_problem(scan), [configuration], 60)[configuration], None)
+    problem = scan_problem(scan, build_maps(map_problem(scan), [configuration], 60)[configuration], None)
     outcome = plan_for_the_arm(problem)
     if isinstance(outcome, NoPlan):
         assert outcome.joint is not None or outcome.infeasibility is not Infeasibility.ARM

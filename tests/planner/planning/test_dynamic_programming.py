@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.cell.scan import load_scan
-from planner.commands.plan import problem_of
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
 from planner.map.map_builder import build_maps
@@ -20,6 +19,7 @@ from planner.planning.lattice_choice import turn_lattice
 from planner.planning.lattice_search import best_motion
 from planner.planning.plan import Infeasibility, NoPlan, Plan, make_plan, path_cost
 from planner.planning.problem import Problem
+from planner.planning.scan_problem import scan_problem
 from planner.table.cost import Weights, default_weights
 from planner.table.motion import Limits, motion_through_angles
 from tests.planner.exhaustive_search import is_forbidden_on_the_way, least_cost, motion
@@ -107,7 +107,7 @@ def test_what_a_grid_is_too_coarse_for_is_found(problem: Problem) -> None:
 def cylinder(request: pytest.FixtureRequest) -> Problem:
     """The shipped scan at a number of angles, in the configuration of its best plan."""
     scan, configuration = load_scan("cylinder"), Configuration.LEFTY_ABOVE_NOFLIP
-    return problem_of(scan, build_maps(map_problem(scan), [configuration], request.param)[configuration], None)
+    return scan_problem(scan, build_maps(map_problem(scan), [configuration], request.param)[configuration], None)
 
 
 @pytest.mark.parametrize("limit_deg_s", [22.5, 23.0, 23.5, 24.0, 25.0])

@@ -1,0 +1,67 @@
+"""The default planner's machine code, compiled in a second process while this one computes maps.
+
+On a new machine, or after a change of a kernel, a plan waits for its kernels. Those of the map and those of the planner
+take about the same time, and numba compiles one after the other in a process.
+"""
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from planner.cell.scan import load_scan
+from planner.defaults import DEFAULT_PLANNER
+from planner.kinematics.configuration import Configuration
+from planner.map.config_map import ConfigurationMap
+from planner.planning.arm_motion import arm_motion
+from planner.planning.dynamic_programming import dynamic_programming
+from planner.planning.lattice_cost_to_go import cost_to_go
+from planner.planning.plan import Plan
+from planner.planning.scan_problem import scan_problem
+from planner.planning.verification import verify
+from planner.progress import ProgressOf
+from protocol.kept_code import is_kept
+
+
+@contextmanager
+def compiling_beside(planner: str, progress: ProgressOf) -> Iterator[Callable[[], None]]:
+    """Have the machine code of a planner compiled, if it is not kept yet, and give what waits for that."""
+    if planner != DEFAULT_PLANNER or is_kept(cost_to_go):
+        yield lambda: None
+        return
+    # What fails there is compiled here, where it is needed.
+    process = subprocess.Popen(  # noqa: S603  # this file
+        [sys.executable, "-m", __name__], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+
+    def wait() -> None:
+        show = progress("plan (compiling, once)")
+        if show is not None:
+            show(0, 1)
+        process.wait()
+        if show is not None:
+            show(1, 1)
+
+    try:
+        yield wait
+    finally:
+        process.kill()
+        process.wait()
+
+
+def compile_default_planner() -> None:
+    """Plan once on a map without obstacles, and judge the plan as a command does: types are those of any other scan."""
+    scan, configuration = load_scan("cylinder"), Configuration.LEFTY_ABOVE_NOFLIP
+    free = np.full((len(scan.path.T_WS), 36), 0.5)
+    problem = scan_problem(scan, ConfigurationMap(free, metadata={"configuration": configuration.label}))
+    plan = dynamic_programming(problem)
+    assert problem.arm is not None
+    assert isinstance(plan, Plan)
+    arm_motion(problem.arm, plan)
+    verify(problem, plan)
+
+
+if __name__ == "__main__":
+    compile_default_planner()

@@ -1,0 +1,65 @@
+"""From a scan to the best plan: its maps, a problem for each arm configuration, and the planner's answers."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from planner.cell.scan import Scan
+from planner.kinematics.configuration import Configuration
+from planner.map.map_builder import build_maps, is_compiled
+from planner.map.map_problem import map_problem
+from planner.planning.arm_motion import ArmMotion, arm_motion
+from planner.planning.best_configuration import Comparison, best_configuration
+from planner.planning.compiling import compiling_beside
+from planner.planning.plan import Plan, Planner
+from planner.planning.problem import Problem
+from planner.planning.scan_problem import scan_problem
+from planner.progress import ProgressOf
+
+
+class ScanPlans(NamedTuple):
+    """What was planned for a scan, by configuration."""
+
+    problems: Mapping[str, Problem]
+    comparison: Comparison
+
+    @property
+    def best(self) -> tuple[Problem, Plan, ArmMotion] | None:
+        """The best plan with its problem and the motion of the arm; None where there is no plan."""
+        if self.comparison.best is None:
+            return None
+        problem, plan = self.problems[self.comparison.best], self.comparison.outcomes[self.comparison.best]
+        assert isinstance(plan, Plan)
+        assert problem.arm is not None
+        return problem, plan, arm_motion(problem.arm, plan)
+
+
+def plan_scan(
+    scan: Scan,
+    configuration: str,
+    angle_count: int,
+    planner: Planner,
+    progress: ProgressOf,
+    start_angle_deg: float | None = None,
+    compiled: str = "",
+) -> ScanPlans:
+    """Plan a scan in one arm configuration, or in all of them.
+
+    Args:
+        scan: what is scanned.
+        configuration: its name, or `best` to compare all.
+        angle_count: table angles of a map.
+        planner: who plans.
+        progress: gives the progress of a kind of work.
+        start_angle_deg: the table's angle at the first location, if it is given.
+        compiled: the name of the planner, if its machine code may be compiled beside the maps.
+
+    Raises:
+        ConfigurationNameError: The name is none.
+    """
+    asked = list(Configuration) if configuration == "best" else [Configuration.parse(configuration)]
+    with compiling_beside(compiled, progress) as wait:
+        problem = map_problem(scan, progress("distance field"))
+        maps = build_maps(problem, asked, angle_count, progress("map" if is_compiled() else "map (compiling, once)"))
+        wait()
+    problems = {each.label: scan_problem(scan, map_, start_angle_deg) for each, map_ in maps.items()}
+    return ScanPlans(problems, best_configuration(problems, planner, progress("plan")))
