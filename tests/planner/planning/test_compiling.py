@@ -30,7 +30,7 @@ assert "cost_to_go" in names
 names.clear()
 scan = load_scan("mould")
 values = synthetic_map(MapFamily(location_count=len(scan.path.T_WS), angle_count=90, forbidden=0.1), 3).values
-problem = scan_problem(scan, ConfigurationMap(values, metadata={"configuration": "LEFTY-ABOVE-NOFLIP"}), 0.0)
+problem = scan_problem(scan, ConfigurationMap(values, metadata={"configuration": "LEFTY-ABOVE-NOFLIP"}))
 plan = dynamic_programming(problem)
 assert isinstance(plan, Plan), plan
 arm_motion(problem.arm, plan)

@@ -178,6 +178,15 @@ def test_views_that_do_not_determine_the_probes_place_are_refused(views: Callabl
         views()
 
 
+@pytest.mark.parametrize(("beside_mm", "count"), [(-4.0, 8), (8.0, 14)])
+def test_the_place_beyond_the_lasers_plane_is_looked_at_as_well(beside_mm: float, count: int) -> None:
+    """All turns of the probe lead to the true place here: only the fit that begins beyond the plane finds the other."""
+    beside = views_of(CENTRE, count, LaserProbe()) @ placement(0.0, beside_mm, 0.0, 0.0, 0.0, 0.0)
+    T_BF, points = seen_from(TRUE.T_FS, beside)
+    with pytest.raises(CalibrationError, match=r"fit two places of the probe equally well, .* mm apart"):
+        calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
+
+
 @pytest.mark.parametrize("name", [*PROBE_TRIALS, *AXIS_TRIALS])
 def test_bad_measurements_are_refused_and_the_stated_uncertainty_is_that_of_clean_ones(name: str) -> None:
     """A few seeds of each kind; `python -m tools.bench calibration` runs 50."""
