@@ -205,3 +205,28 @@ def test_the_stand_in_starts_with_neither_numpy_nor_numba() -> None:
     program = "import sys, emulator.__main__; print(*({'numpy', 'numba', 'scipy'} & sys.modules.keys()))"
     result = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
     assert result.stdout.strip() == ""
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "emulator",
+        "emulator.control_client",
+        "planner",
+        "protocol.conformance",
+        *(
+            f"tools.{path.stem}"
+            for path in sorted((ROOT / "tools").glob("*.py"))
+            if "argparse" in path.read_text("utf-8")
+        ),
+        "tools.bench",
+    ],
+)
+def test_help_is_printed_without_numba(program: str) -> None:
+    code = (
+        "import runpy, sys\n"
+        f"sys.argv = ['{program}', '--help']\n"
+        f"try: runpy.run_module('{program}', run_name='__main__', alter_sys=True)\n"
+        "except SystemExit as end: sys.exit(end.code or 'numba' in sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, check=True)

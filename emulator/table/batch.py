@@ -4,6 +4,7 @@ For tuning, Monte Carlo and the verification of plans. The compiled functions ar
 so states agree to the last bit; a test holds them to it. This module needs numpy and numba, the stand-in does not.
 """
 
+from functools import cache
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +14,6 @@ from emulator.firmware import profiler
 from emulator.firmware.controller import begin_motion, distance_to
 from emulator.firmware.profiler import Profile
 from emulator.plant.drive_train import DriveState
-from emulator.table.machine_code import compiled, inlined
 from emulator.table.tick import TableConstants, TableState, step
 from protocol.interrupts import signals_wait
 
@@ -55,7 +55,7 @@ def run(
     """
     samples = np.empty((ticks // every, len(COLUMNS)))
     with signals_wait():
-        return _compiled(constants, state, ticks, motions, loads, every, samples), samples
+        return _compiled()(constants, state, ticks, motions, loads, every, samples), samples
 
 
 def advance(
@@ -109,6 +109,10 @@ def _sample(samples: NDArray[np.float64], row: int, state: TableState, bits: int
     samples[row, 11] = controller.motion
 
 
-inlined(_command)
-inlined(_sample)
-_compiled: Any = compiled(advance)
+@cache
+def _compiled() -> Any:  # noqa: ANN401  # numba's dispatcher
+    from emulator.table.machine_code import compiled, inlined  # noqa: PLC0415  # numba is imported only when it is used
+
+    inlined(_command)
+    inlined(_sample)
+    return compiled(advance)

@@ -4,6 +4,7 @@ Over the wire the duty is not seen; but it follows from the commands, so the who
 drive's duty is known, so there the plant runs alone.
 """
 
+from functools import cache
 from math import ceil
 from typing import Any, NamedTuple
 
@@ -16,7 +17,6 @@ from emulator.firmware.profiler import Profile
 from emulator.plant import drive_train
 from emulator.plant.drive_train import DriveState, DriveTrain, at_standstill
 from emulator.table.batch import COLUMNS, run
-from emulator.table.machine_code import compiled
 from emulator.table.tick import table_constants, woken
 from protocol.interrupts import signals_wait
 from tools.emulated import Array, Motion, motion_rows
@@ -98,7 +98,7 @@ def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) ->
     train = drive_constants(config)
     angle = np.empty(len(duty))
     with signals_wait():
-        _run_open(train, at_standstill(train, MIDDLE.gap_share), applied, angle)
+        _compiled_open_loop()(train, at_standstill(train, MIDDLE.gap_share), applied, angle)
     return np.degrees(angle) / config.gears.ratio
 
 
@@ -115,5 +115,8 @@ def _open_loop(train: DriveTrain, state: DriveState, voltage_V: Array, angle_rad
         angle_rad[tick] = state.angle_rad
 
 
-# `emulator.table.batch` has made the plant's functions known to numba.
-_run_open: Any = compiled(_open_loop)
+@cache
+def _compiled_open_loop() -> Any:  # noqa: ANN401  # numba's dispatcher
+    from emulator.table.machine_code import compiled  # noqa: PLC0415  # numba is imported only when it is used
+
+    return compiled(_open_loop)
