@@ -13,6 +13,7 @@ from emulator.config.table_config import load_config
 from emulator.config.toml_section import ConfigError
 from protocol.client import TableClient
 from protocol.errors import TableError
+from protocol.progress import share_shown
 from protocol.whole_file import write_whole
 from tools.command_line import check_writable, ended
 from tools.identification.errors import RecordingError
@@ -23,7 +24,6 @@ from tools.identification.identify_table import identify
 from tools.identification.recorder import record
 from tools.identification.recording import read_recording, write_recording
 from tools.identification.recording_checks import LEAST_DURATION_S, check_line, check_recording
-from tools.progress import Progress
 
 _LONGEST_S = 3600.0
 _NEEDED = ("gain", "time constant", "Coulomb friction")
@@ -50,9 +50,9 @@ def _record(options: argparse.Namespace) -> int:
     check_writable(options.out)
     config = load_config(options.config).with_serial(baud=options.baud)
     bursts = excitation(options.duration, options.speed, options.acceleration, options.seed)
-    with TableClient.open(options.port, baud=options.baud) as client, Progress("recording") as progress:
+    with TableClient.open(options.port, baud=options.baud) as client, share_shown("recording") as progress:
         recording = record(
-            client, bursts, options.speed, options.baud, progress.show, lambda so_far: check_line(config, so_far)
+            client, bursts, options.speed, options.baud, progress, lambda so_far: check_line(config, so_far)
         )
     write_recording(options.out, recording)
     print(f"{options.out}: {len(recording.time_s)} readings, {len(recording.commands)} commands")
@@ -70,8 +70,8 @@ def _fit(options: argparse.Namespace) -> int:
         check_recording(config, recording)
     except RecordingError as error:
         raise RecordingError(f"{options.recording}: {error}") from error
-    with Progress("fitting") as progress:
-        found = identify(config, recording, progress.show)
+    with share_shown("fitting") as progress:
+        found = identify(config, recording, progress)
     try:
         check_fit(found)
     except RecordingError as error:

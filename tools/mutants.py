@@ -17,9 +17,9 @@ from random import Random
 from typing import NamedTuple
 
 from emulator.table.fast_ticks import LOADED_TICKS
+from protocol.progress import share_shown
 from tools.command_line import ended
 from tools.mutation import COMPILED, MODULES, Mutation, mutations_of, planted
-from tools.progress import Progress
 
 EXPLAINED = Path(__file__).with_name("mutants.toml")
 _CPU_S = 60
@@ -84,9 +84,9 @@ def hunt(count: int, seed: int) -> Iterator[tuple[Mutation, str]]:
     """Yield random mutations, each with what the suite says of it: nothing if it came through."""
     mutations = list(enumerate(mutations_of(MODULES)))
     chosen = Random(seed).sample(mutations, min(count, len(mutations)))  # noqa: S311 - no secret
-    with Progress("mutants") as progress:
+    with share_shown("mutants") as progress:
         for number, (index, mutation) in enumerate(chosen):
-            progress.show(number / len(chosen))
+            progress(number / len(chosen))
             yield mutation, verdict_in_a_process(index, seed)
 
 

@@ -21,9 +21,9 @@ from queue import SimpleQueue
 from random import Random
 from typing import Final, NamedTuple
 
+from protocol.progress import share_shown
 from tools.command_line import ended
 from tools.mutation import Mutation, mutated_source, mutations_of
-from tools.progress import Progress
 
 ROOT: Final = Path(__file__).parents[1]
 FOLDERS: Final = (
@@ -86,7 +86,7 @@ def score(mutations: Sequence[Mutation], jobs: int, reasons: dict[str, str]) -> 
     """Return what becomes of mutations, several at a time."""
     killed = explained = 0
     survivors: list[Mutation] = []
-    with Progress("mutants") as progress:
+    with share_shown("mutants") as progress:
         for number, (mutation, dead) in enumerate(_verdicts(mutations, jobs)):
             if dead:
                 killed += 1
@@ -95,7 +95,7 @@ def score(mutations: Sequence[Mutation], jobs: int, reasons: dict[str, str]) -> 
             else:
                 survivors.append(mutation)
                 print(f"survived: {mutation.module}: {mutation}", flush=True)
-            progress.show((number + 1) / len(mutations))
+            progress((number + 1) / len(mutations))
     return Score(killed, explained, survivors)
 
 

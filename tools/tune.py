@@ -21,9 +21,9 @@ from pathlib import Path
 
 from emulator.config.table_config import load_config
 from emulator.config.toml_section import ConfigError
+from protocol.progress import share_shown
 from protocol.whole_file import whole_file
 from tools.command_line import check_folder, ended
-from tools.progress import Progress
 from tools.tuning.bounds import Limits
 from tools.tuning.figures_json import figures_json
 from tools.tuning.gain_design import Design
@@ -49,8 +49,8 @@ def _tune(options: argparse.Namespace) -> int:
     limits = _limits(options)
     folder = options.out or _TUNE_FOLDER
     check_folder(folder)
-    with Progress("tuning") as progress:
-        tuning = tune(config, limits, options.plants, options.spread / 100.0, options.seed, progress.show)
+    with share_shown("tuning") as progress:
+        tuning = tune(config, limits, options.plants, options.spread / 100.0, options.seed, progress)
     _write(folder, tuning)
     if not tuning.feasible:
         raise TuningError(_refusal(tuning, options))
@@ -65,8 +65,8 @@ def _judge(options: argparse.Namespace) -> int:
     if options.judge.resolve() == (folder / "gains.toml").resolve():
         raise TuningError(f"{options.judge} would be overwritten; --out must be another folder")
     check_folder(folder)
-    with Progress("judging") as progress:
-        tuning = judge(config, gains, limits, options.plants, options.spread / 100.0, options.seed, progress.show)
+    with share_shown("judging") as progress:
+        tuning = judge(config, gains, limits, options.plants, options.spread / 100.0, options.seed, progress)
     _write(folder, tuning)
     _print(tuning)
     print(verdict(tuning))

@@ -23,10 +23,10 @@ from planner.errors import PlannerError, ScanFileError, WorkpieceError
 from planner.geometry.mesh import load_mesh, radius_about_axis_mm, size_fault
 from planner.kinematics.arm import Arm
 from planner.kinematics.value import ValueFunction
-from planner.progress import Progress
 from planner.table.cost import Weights, costs_overflow, default_weights
 from planner.table.motion import Limits
 from planner.toml_table import TomlTable
+from protocol.progress import Progress
 
 _DEFAULT_ARM = "viper_s650"
 # A workpiece may touch the table, and a mesh's base need not be ground flat.

@@ -25,8 +25,8 @@ from planner.planning.problem import Problem
 from planner.planning.scan_planning import plan_scan
 from planner.planning.smoothing import smooth
 from planner.planning.verification import verify
-from planner.progress import progress_line
 from planner.set_aside import set_aside
+from protocol.progress import progress_line
 
 _NO_PLAN = 1
 # A run belongs to its plan: beside another plan it would pass for a run of that.

@@ -7,8 +7,8 @@ from planner.commands import options
 from planner.errors import PlannerError
 from planner.execution.run import RunOptions, run_plan
 from planner.execution.run_verification import RunVerification
-from planner.progress import progress_line
 from protocol import TableError
+from protocol.progress import progress_line
 
 _DEVIATED, _NOT_RUN = 1, 2
 

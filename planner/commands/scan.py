@@ -7,13 +7,13 @@ from pathlib import Path
 from planner.cell.scan import load_scan, with_mesh
 from planner.commands import options
 from planner.errors import PlannerError
-from planner.progress import progress_line
 from planner.scanning.latched_run import TriggerConditions
 from planner.scanning.scan_file import save_scan, scan_document
 from planner.scanning.scan_report import scan_report, verdict_of
 from planner.scanning.scan_run import Scanned, ScanOptions, scan_workpiece
 from planner.set_aside import set_aside
 from protocol import TableError
+from protocol.progress import progress_line
 from protocol.whole_file import write_whole
 
 _INCOMPLETE = 1

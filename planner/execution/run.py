@@ -28,10 +28,10 @@ from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_motion import PauseTimes, TableMotion
 from planner.execution.table_port import open_port
 from planner.map.map_file import MAP_FILE
-from planner.progress import Progress
 from planner.set_aside import set_aside
 from planner.table.wire import Wire
 from protocol import TableClient
+from protocol.progress import Progress
 
 
 class RunOptions(NamedTuple):

@@ -10,9 +10,9 @@ import numpy as np
 from planner.execution.inside_view import InsideView
 from planner.execution.run_record import Observation, Record
 from planner.execution.table_motion import TableMotion
-from planner.progress import Progress
 from planner.table.wire import Wire
 from protocol import TableClient, TableError
+from protocol.progress import Progress
 
 # What the bytes of H, or of L, and of its answer come to.
 _QUESTION_BYTES, _ANSWER_BYTES = 2, 10

@@ -11,7 +11,7 @@ from planner.geometry.components import connected
 from planner.geometry.edges import edges_of
 from planner.geometry.winding_number import solid_angles
 from planner.kernel import kernel
-from planner.progress import Progress
+from protocol.progress import Progress
 
 _TOUCHING = 1e-6
 """How deep, in longest sides of the mesh, bodies may reach into each other and still only touch."""

@@ -12,7 +12,7 @@ from planner.errors import WorkpieceError
 from planner.geometry.closed_surface import closed_surface
 from planner.geometry.crossing import first_crossing
 from planner.geometry.mesh_file import read_mesh_file
-from planner.progress import Progress
+from protocol.progress import Progress
 
 # A part that a probe with a 60 mm line and an arm of 650 mm reach can be meant for.
 SMALLEST_MM = 10.0

@@ -20,8 +20,8 @@ from planner.geometry.bounding_volume_hierarchy import bounding_volume_hierarchy
 from planner.geometry.shells import turned_outward
 from planner.geometry.winding_number import BESIDE, winding_numbers
 from planner.kernel import kernel
-from planner.progress import Progress
 from protocol.kept_code import cache_root
+from protocol.progress import Progress
 from protocol.whole_file import whole_file
 
 _MOST_POINTS = 4_000_000

@@ -36,9 +36,9 @@ from planner.kinematics.value import (
 from planner.map.config_map import DEFAULT_EPSILON, ConfigurationMap, ConfigurationMapError
 from planner.map.map_problem import MapProblem
 from planner.map.map_reasons import FIRST_PAIR, FIRST_USER_FACTOR, reason_texts
-from planner.progress import Progress
 from planner.reasons import Reason
 from protocol.kept_code import is_kept
+from protocol.progress import Progress
 
 _REACHED = int(Reason.REACHED)
 _SINGULAR = int(Reason.SINGULAR)

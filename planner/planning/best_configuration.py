@@ -8,7 +8,7 @@ from planner.cell.unit_hints import unit_hint
 from planner.planning.arm_motion import arm_follows
 from planner.planning.plan import Infeasibility, NoPlan, Outcome, Plan, Planner
 from planner.planning.problem import Problem
-from planner.progress import Progress
+from protocol.progress import Progress
 
 
 class Comparison(NamedTuple):

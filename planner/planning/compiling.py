@@ -21,8 +21,8 @@ from planner.planning.lattice_cost_to_go import cost_to_go
 from planner.planning.plan import Plan
 from planner.planning.scan_problem import scan_problem
 from planner.planning.verification import verify
-from planner.progress import ProgressOf
 from protocol.kept_code import is_kept
+from protocol.progress import ProgressOf
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from planner.planning.compiling import compiling_beside
 from planner.planning.plan import Plan, Planner
 from planner.planning.problem import Problem
 from planner.planning.scan_problem import scan_problem
-from planner.progress import ProgressOf
+from protocol.progress import ProgressOf
 
 
 class ScanPlans(NamedTuple):

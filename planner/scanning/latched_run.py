@@ -18,12 +18,12 @@ from planner.execution.robot_motion import RobotMotion, robot_motion
 from planner.execution.run_record import Record
 from planner.execution.table_motion import Phase, TableMotion
 from planner.planning.plan import Plan
-from planner.progress import Progress
 from planner.scanning.latching import Drop, Pairing, RobotLatch, TableReading, Tolerances, Trigger, pair
 from planner.scanning.trigger_line import TableTruth, TriggerFaults, TriggerLine, robot_latch_times_s
 from planner.table.motion import Limits
 from planner.table.wire import Wire
 from protocol import TableClient
+from protocol.progress import Progress
 
 # The first profile comes when the first command has been sent.
 _FIRST_PROFILE_S = 0.06

@@ -30,7 +30,6 @@ from planner.planning.arm_check import PlannedArm, arm_fault
 from planner.planning.plan import Plan
 from planner.planning.planners import PLANNERS
 from planner.planning.scan_planning import plan_scan
-from planner.progress import Progress, ProgressOf
 from planner.scanning.alignment import Calibration, aligned, probe_poses
 from planner.scanning.calibration import AxisCalibration, PartSize
 from planner.scanning.coverage import Coverage
@@ -44,6 +43,7 @@ from planner.scanning.trigger_line import ProbeByHand, ProbeOnPort, TriggerLine
 from planner.table.motion import Limits
 from planner.table.wire import Wire
 from protocol import TableClient
+from protocol.progress import Progress, ProgressOf
 
 # Profiles that are measured at once: some 40 000 points.
 _BLOCK = 64

@@ -3,11 +3,11 @@
 import os
 import sys
 from contextlib import suppress
-from typing import TextIO
 
 from protocol.conformance.bench.ports import is_simulated
 from protocol.conformance.bench.wire import ReopenablePort
 from protocol.conformance.profile.profile import Profile
+from protocol.progress import is_terminal, show_line
 
 
 class UsageError(Exception):
@@ -41,15 +41,7 @@ def tell(text: str) -> None:
 
 def show_progress(text: str) -> None:
     """Show how far the work is, in place of what was shown before; on a terminal that can do so only."""
-    if is_terminal(sys.stderr) and os.environ.get("TERM") != "dumb":
-        with suppress(OSError):
-            sys.stderr.write(f"\r\x1b[K{text}\r" if text else "\r\x1b[K")
-            sys.stderr.flush()
-
-
-def is_terminal(stream: TextIO | None) -> bool:
-    """Return whether a person is at a stream; one that was closed before the start is None."""
-    return stream is not None and stream.isatty()
+    show_line(text, sys.stderr)
 
 
 def confirm(url: str, may_move: bool, profile: Profile, port: ReopenablePort) -> None:

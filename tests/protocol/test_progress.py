@@ -1,6 +1,6 @@
 import io
 
-from planner.progress import progress_line
+from protocol.progress import progress_line
 
 
 class Terminal(io.StringIO):
