@@ -9,17 +9,18 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
+from statistics import fmean
 from typing import NamedTuple, TextIO
 
 import emulator  # noqa: F401  # teaches pyserial the port emulator://
 from emulator.config.table_config import load_config
 from protocol.client import TableClient
 from tools.bench.identify_tables import DEFAULT, NARROW, WIDE, Family, write_constants
-from tools.bench.timing import print_table
+from tools.bench.timing import percentile, print_row, print_table
 from tools.identification.constants import DERIVED
 from tools.identification.errors import RecordingError
 from tools.identification.excitation import excitation
@@ -31,6 +32,7 @@ from tools.identification.recording_checks import check_recording
 
 _PLANTS, _WIDE_PLANTS, _DEFAULT_SEEDS = 10, 40, range(20)
 _DURATION_S, _SPEED_DEG_S, _ACCELERATION_DEG_S2, _BAUD = 60.0, 40.0, 100.0, 9600
+_ERROR_WIDTH = len("-100.0 * ?")
 
 
 class Found(NamedTuple):
@@ -59,45 +61,78 @@ def bench(
         _bench(stream, DEFAULT, _DEFAULT_SEEDS, jobs, pty)
 
 
-def _bench(stream: TextIO, family: Family, seeds: Iterable[int], jobs: int, pty: bool) -> None:
+def _bench(stream: TextIO, family: Family, seeds: Sequence[int], jobs: int, pty: bool) -> None:
+    line = "pseudo-terminals in real time" if pty else "emulator://"
+    print(
+        f"\nErrors in % for {family.title}, {_DURATION_S:g} s over {line}; * the truth is outside the 95 % interval, "
+        "? not identifiable",
+        file=stream,
+    )
+    names = [name for name, _, _ in DERIVED]
+    header = ("seed, backlash", *names, "CPU, s", "within bounds")
+    widths = [len(f"{seeds[-1]}, 10.0 arcmin"), *(max(len(name), _ERROR_WIDTH) for name in header[1:])]
+    print_row(stream, header, widths)
+    outcomes = []
+    for seed, backlash_arcmin, outcome in _outcomes(family, seeds, jobs, pty):
+        outcomes.append(outcome)
+        cells = [_cell(outcome.constants[name]) if outcome.constants else "-" for name in names]
+        verdict = outcome.refused or ("yes" if _within(outcome, family) else "NO")
+        print_row(stream, (f"{seed}, {backlash_arcmin:.1f} arcmin", *cells, f"{outcome.cpu_s:.0f}", verdict), widths)
+    _print_summary(stream, family, outcomes)
+
+
+def _outcomes(family: Family, seeds: Sequence[int], jobs: int, pty: bool) -> Iterator[tuple[int, float, Outcome]]:
+    """Yield seed, backlash (arcmin) and outcome of each table as soon as it is fitted."""
     with tempfile.TemporaryDirectory() as name, ProcessPoolExecutor(jobs) as workers:
         folder = Path(name)
-        tables = [family.table(each) for each in seeds]
+        tables = [family.table(seed) for seed in seeds]
         known = [
-            write_constants(folder / f"{each}.known.toml", table.known)
-            for each, table in zip(seeds, tables, strict=True)
+            write_constants(folder / f"{seed}.known.toml", table.known)
+            for seed, table in zip(seeds, tables, strict=True)
         ]
         truth = [
-            write_constants(folder / f"{each}.toml", table.known | table.hidden)
-            for each, table in zip(seeds, tables, strict=True)
+            write_constants(folder / f"{seed}.toml", table.known | table.hidden)
+            for seed, table in zip(seeds, tables, strict=True)
         ]
         recordings = list(workers.map(partial(_recorded, pty=pty), truth, seeds))
         # Fitted only now: it keeps the cores busy, which would disturb a recording.
-        outcomes = list(workers.map(_identified, known, truth, recordings))
-        backlashes = [load_config(path).gears.backlash_arcmin for path in truth]
-    line = "pseudo-terminals in real time" if pty else "emulator://"
-    names = [name for name, _, _ in DERIVED]
-    print_table(
-        stream,
-        f"Errors in % for {family.title}, {_DURATION_S:g} s over {line}; * the truth is outside the 95 % interval",
-        ("seed, backlash", *names, "CPU, s", "within bounds"),
-        [
-            (
-                f"{seed}, {backlash:.1f} arcmin",
-                *(f"{100.0 * found.error:+.1f}{'' if found.inside else ' *'}" for found in outcome.constants.values()),
-                f"{outcome.cpu_s:.0f}",
-                outcome.refused or ("yes" if _within(outcome, family) else "NO"),
-            )
-            for seed, backlash, outcome in zip(seeds, backlashes, outcomes, strict=True)
-        ],
-    )
+        outcomes = workers.map(_identified, known, truth, recordings)
+        for seed, path, outcome in zip(seeds, truth, outcomes, strict=True):
+            yield seed, load_config(path).gears.backlash_arcmin, outcome
+
+
+def _cell(found: Found) -> str:
+    return f"{100.0 * found.error:+.1f}{'' if found.inside else ' *'}{'' if found.identifiable else ' ?'}"
+
+
+def _print_summary(stream: TextIO, family: Family, outcomes: Sequence[Outcome]) -> None:
+    """Print how often the intervals hold, and how large the errors are, per constant."""
     accepted = [outcome.constants for outcome in outcomes if not outcome.refused]
-    for title, count in (("truth inside the 95 % interval", "inside"), ("identifiable", "identifiable")):
-        shares = [f"{name} {sum(getattr(found[name], count) for found in accepted)}" for name in names]
-        print(f"  {title}, of {len(accepted)} accepted: {', '.join(shares)}", file=stream)
-    bounds = ", ".join(f"{name} {100.0 * bound:g} %" for name, bound in family.bounds.items())
+    rows = []
+    for name in next(iter(accepted), {}):
+        found = [constants[name] for constants in accepted]
+        errors = [100.0 * abs(each.error) for each in found]
+        bound = f"{100.0 * family.bounds[name]:g}" if name in family.bounds else ""
+        inside, identifiable = (sum(getattr(each, count) for each in found) for count in ("inside", "identifiable"))
+        rows.append(
+            (
+                name,
+                f"{inside} of {len(found)} ({100.0 * inside / len(found):.0f} %)",
+                f"{identifiable} of {len(found)}",
+                *(f"{percentile(errors, share):.2f}" for share in (0.5, 0.95, 1.0)),
+                bound,
+            )
+        )
+    header = ("constant", "truth in the 95 % interval", "identifiable", "median", "95th percentile", "worst", "bound")
+    print_table(stream, f"Absolute errors in %, of {len(accepted)} accepted recordings", header, rows)
     within = sum(_within(outcome, family) for outcome in outcomes)
-    print(f"  within bounds ({bounds}): {within} of {len(outcomes)}", file=stream, flush=True)
+    print(
+        f"  within the bounds: {within} of {len(outcomes)}; refused: {len(outcomes) - len(accepted)}; CPU of a fit: "
+        f"mean {fmean(outcome.cpu_s for outcome in outcomes):.1f} s, "
+        f"maximum {max(outcome.cpu_s for outcome in outcomes):.1f} s",
+        file=stream,
+        flush=True,
+    )
 
 
 def _within(outcome: Outcome, family: Family) -> bool:

@@ -27,9 +27,13 @@ def print_table(stream: TextIO, title: str, header: Sequence[str], rows: Sequenc
     widths = [max(len(row[column]) for row in (header, *rows)) for column in range(len(header))]
     print(f"\n{title}", file=stream)
     for row in (header, *rows):
-        cells = (
-            cell.rjust(width) if column else cell.ljust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        )
-        print("  " + "  ".join(cells), file=stream)
-    stream.flush()
+        print_row(stream, row, widths)
+
+
+def print_row(stream: TextIO, row: Sequence[str], widths: Sequence[int]) -> None:
+    """Print a row of a table with given widths, at once."""
+    cells = (
+        cell.rjust(width) if column else cell.ljust(width)
+        for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+    )
+    print("  " + "  ".join(cells), file=stream, flush=True)
