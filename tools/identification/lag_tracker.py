@@ -17,8 +17,10 @@ from tools.identification.excitation import Reference
 _MEAN = (3.5e-3, 0.05, 8e-5, 5e-5)
 _DEVIATION = (3e-3, 0.03, 1e-4, 1e-4)
 _UNFORETOLD_DEG = 0.006
-_FORGETTING = 1.001
+_FORGETTING, _SURPRISED = 1.001, 1.1
 _SURPRISE = 1e-3
+_WIDEST = 30.0
+"""The largest deviation, in times the first one: a table that has slipped surprises without end."""
 _LOOK_S = 0.002
 
 
@@ -44,14 +46,18 @@ class LagTracker:
         deviation, foretold = sqrt(variance), float(features @ self._mean)
         low, high = (low_deg - foretold) / deviation, (high_deg - foretold) / deviation
         probability = _normal(high) - _normal(low)
-        self._covariance *= _FORGETTING
+        self._forget(_FORGETTING if probability >= _SURPRISE else _SURPRISED)
         if probability < _SURPRISE:
-            self._covariance *= 1.1
             return
         shift = (_density(low) - _density(high)) / probability
-        narrowing = shift**2 - (low * _density(low) - high * _density(high)) / probability
+        narrowing = min(shift**2 - (low * _density(low) - high * _density(high)) / probability, 1.0)
         self._mean = self._mean + spread * shift / deviation
         self._covariance = self._covariance - np.outer(spread, spread) * narrowing / variance
+
+    def _forget(self, factor: float) -> None:
+        deviation = np.sqrt(factor * np.diag(self._covariance))
+        shrink = np.minimum(1.0, _WIDEST * np.array(_DEVIATION) / deviation)
+        self._covariance *= factor * np.outer(shrink, shrink)
 
 
 def next_passage_s(position_deg: Callable[[float], float], step_deg: float, begin_s: float, within_s: float) -> float:
