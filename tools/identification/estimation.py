@@ -66,6 +66,11 @@ _STEPS = (1.0, 0.5, 0.25)
 _HALF_TRUST = 6.0
 """The same for one half of the readings."""
 
+_FINE, _HOPELESS = 1.5, 30.0
+"""A search that ends at a scale between so many times the finest is repeated. Above, the recording is not good."""
+_MORE_MEMBERS = 0.5
+"""By which share the ensembles of the repetition are larger."""
+
 _NEWTON_ROUNDS, _NEWTON_GAIN = 12, 0.05
 
 _EQUAL_HEIGHT = 8.0
@@ -118,7 +123,28 @@ def estimate(
         values: Its value in each chain.
         progress: Called with the share that is done.
     """
-    chance = np.random.default_rng(0)
+    chance, chains = np.random.default_rng(0), _search(posterior, forked, values, 0, progress)
+    least_deg = FINE_LEVELS[-1].least_deg
+    scale_deg = posterior.readings.best_scale_deg(chains[0].predicted_deg, least_deg)
+    if _FINE * least_deg < scale_deg < _HOPELESS * least_deg:
+        again = _search(posterior, forked, values, 1, progress)
+        chains = max(chains, again, key=lambda found: found[0].height)
+    return _with_covariance(posterior, chains, chance)
+
+
+def _search(
+    posterior: Posterior, forked: int, values: list[float], repetition: int, progress: Callable[[float], None]
+) -> list[_Chain]:
+    """Return the ends of the best chains.
+
+    Args:
+        posterior: The problem.
+        forked: The index of the constant in which the chains differ at first.
+        values: Its value in each chain.
+        repetition: 0 for the first search, 1 for the second, which has larger and other ensembles.
+        progress: Called with the share that is done.
+    """
+    chance, members = np.random.default_rng(repetition), (1.0 + _MORE_MEMBERS * repetition)
     levels = (COMMON_LEVEL, *LEVELS, *FINE_LEVELS)
     origin, first = np.zeros(posterior.size + posterior.drift.shape[1]), _FIRST_SPREAD**2 * np.eye(posterior.size)
     chains = [_Chain(origin, np.empty(0), first, _REACH[1], -np.inf)]
@@ -129,14 +155,15 @@ def estimate(
             best = chains[0]
             chains += [_forked(best, best.covariance, forked, best.vector[forked] + shift) for shift in _FORK]
         heights = [-np.inf] * _PATIENCE
+        larger = level._replace(members=2 * round(members * level.members / 2.0))
         for turn in range(level.rounds):
-            chains = [_advanced(posterior, chain, level, chance) for chain in chains]
+            chains = [_advanced(posterior, chain, larger, chance) for chain in chains]
             progress((done + (turn + 1) / level.rounds) / len(levels))
             heights.append(max(chain.height for chain in chains))
             if heights[-1] - heights[-1 - _PATIENCE] < level.enough:
                 break
         chains = _survivors(chains, level)
-    return _with_covariance(posterior, chains, chance)
+    return chains
 
 
 def _survivors(chains: list[_Chain], level: Level) -> list[_Chain]:
@@ -164,7 +191,8 @@ def _advanced(posterior: Posterior, chain: _Chain, level: Level, chance: np.rand
     model = LinearPosterior.of(posterior, ensemble, drift)
     scale_deg = posterior.readings.best_scale_deg(model.still_deg, level.least_deg)
     reachable = np.array([_TRUST] * size + [np.inf] * len(drift))
-    move = model.maximum(scale_deg, reachable, _NEWTON_ROUNDS, _NEWTON_GAIN)
+    rough_deg = np.hypot(scale_deg, model.unexplained_deg())  # the linear model's error is part of the prediction's
+    move = model.maximum(rough_deg, reachable, _NEWTON_ROUNDS, _NEWTON_GAIN)
 
     if not len(chain.predicted_deg):
         vector, predicted_deg = posterior.with_drift(ensemble.center, drift, scale_deg)
@@ -182,7 +210,7 @@ def _advanced(posterior: Posterior, chain: _Chain, level: Level, chance: np.rand
             chain = chain._replace(vector=vector, predicted_deg=predicted_deg)
             reach = min(chain.reach * _LONGER, _REACH[1])
             break
-    information = model.information(move, scale_deg) + model.prior_information()
+    information = model.information(move, rough_deg) + model.prior_information()
     covariance = ensemble.root @ np.linalg.inv(information)[:size, :size] @ ensemble.root.T
     scale_deg = posterior.readings.best_scale_deg(chain.predicted_deg, level.least_deg)
     return _Chain(

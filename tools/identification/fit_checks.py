@@ -1,6 +1,7 @@
 """Whether a fit is to be believed: the model must explain the readings, and the motor should be the configured one."""
 
 from math import log, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from tools.identification.errors import RecordingError
 from tools.identification.identify_table import Identified
 from tools.identification.parameters import PARAMETERS, with_logarithms
 
-MOST_UNEXPLAINED_DEG = 2e-3
+MOST_UNEXPLAINED_DEG = 3e-4
 """The root mean square beyond rounding that a good recording stays below."""
 
 _STRIPES = 30
@@ -18,12 +19,22 @@ _WHOLE = 0.5
 """Errors in at least this share of the recording are said to be everywhere."""
 
 _COMPARED = ("gain", "time constant", "Coulomb friction as duty", "backlash")
-_MOST_APART = 2.5
-"""By how many standard deviations the halves may differ. Steady tables stay below 1, since the deviations include the
-model error."""
+MOST_APART = 1.8
+"""By how many standard deviations the halves may differ. The deviations include the model error, so halves of steady
+tables differ by half of one on average, and by 1.5 at most in a hundred comparisons."""
 
 _AT_ODDS = log(1.25)
 """A torque constant differs from its datasheet by a tenth; by a quarter it is another motor."""
+
+
+class Halves(NamedTuple):
+    """A constant as each half of the recording gives it, and by how many standard deviations the two differ."""
+
+    name: str
+    unit: str
+    first: float
+    second: float
+    apart: float
 
 
 def check_fit(found: Identified) -> None:
@@ -33,12 +44,21 @@ def check_fit(found: Identified) -> None:
         RecordingError: What is left unexplained is more than rounding, or the halves of the recording disagree.
     """
     _check_residual(found)
-    for name, unit, function in DERIVED:
-        if name in _COMPARED:
-            _check_halves(found, name, unit, function)
+    for half in halves_of(found):
+        if half.apart > MOST_APART:
+            raise RecordingError(
+                f"the halves of the recording disagree: {half.name} {half.first:.4g} in the first, {half.second:.4g} "
+                f"{half.unit} in the second, {half.apart:.1f} standard deviations apart (allowed {MOST_APART:g}): "
+                "load, friction, table or clock changed, or gains, gears or encoder differ from --config"
+            )
 
 
-def _check_halves(found: Identified, name: str, unit: str, function: Derived) -> None:
+def halves_of(found: Identified) -> tuple[Halves, ...]:
+    """Return the constants that are compared, as each half of the recording gives them."""
+    return tuple(_halves(found, name, unit, function) for name, unit, function in DERIVED if name in _COMPARED)
+
+
+def _halves(found: Identified, name: str, unit: str, function: Derived) -> Halves:
     values, variances = [], []
     for half in found.estimate.halves:
         logarithms = half.vector[: len(PARAMETERS)]
@@ -46,24 +66,23 @@ def _check_halves(found: Identified, name: str, unit: str, function: Derived) ->
         slope[: len(PARAMETERS)] = log_slope(found.config, logarithms, function)
         values.append(function(with_logarithms(found.config, logarithms)))
         variances.append(float(slope @ half.covariance @ slope))
-    apart = abs(log(values[1] / values[0])) / sqrt(sum(variances))
-    if apart > _MOST_APART:
-        raise RecordingError(
-            f"the halves of the recording disagree: {name} {values[0]:.4g} in the first, {values[1]:.4g} {unit} in the "
-            f"second, {apart:.1f} standard deviations apart (allowed {_MOST_APART:g}): load, friction, table or clock "
-            "changed, or gains, gears or encoder differ from --config"
-        )
+    return Halves(name, unit, values[0], values[1], abs(log(values[1] / values[0])) / sqrt(sum(variances)))
+
+
+def unexplained_rms_deg(found: Identified) -> float:
+    """Return the root mean square of what rounding does not explain."""
+    return float(np.sqrt(np.mean(found.unexplained_deg**2)))
 
 
 def _check_residual(found: Identified) -> None:
-    left = found.unexplained_deg
-    rms_deg = float(np.sqrt(np.mean(left**2)))
+    rms_deg, count_deg = unexplained_rms_deg(found), 360.0 / found.config.counts_per_turn
     if rms_deg <= MOST_UNEXPLAINED_DEG:
         return
     raise RecordingError(
-        f"the model does not explain the recording: beyond rounding {rms_deg:.2g} deg rms are left "
-        f"(allowed {MOST_UNEXPLAINED_DEG:g}), {_where(found)}; a step or drift of the clock, a changed load or table, "
-        "a table that was turned by hand, an encoder that lost counts, or other gains, gears or encoder than configured"
+        f"the model does not explain the recording: beyond rounding {rms_deg:.2g} deg rms ({rms_deg / count_deg:.2g} "
+        f"counts) are left (allowed {MOST_UNEXPLAINED_DEG:g} deg), {_where(found)}; a step or drift of the clock, a "
+        "changed load or table, a table that was turned by hand, an encoder that lost counts, other gains, gears or "
+        "encoder than configured, or a search that ended in a wrong place: record again"
     )
 
 

@@ -7,6 +7,7 @@ from emulator.config.table_config import TableConfig
 from tools.config_file import config_toml
 from tools.html_report import BLUE, ORANGE, figure_block, heading, new_figure, page, paragraph, svg_of, table_block
 from tools.identification.constants import Constant
+from tools.identification.fit_checks import MOST_APART, MOST_UNEXPLAINED_DEG, halves_of, unexplained_rms_deg
 from tools.identification.identify_table import Identified
 from tools.identification.parameters import PARAMETERS
 
@@ -45,6 +46,7 @@ def fit_report(found: Identified, assumed: TableConfig, source: str, warning: st
         "Identified table",
         [
             paragraph(f"From {source}: {len(found.time_s)} readings used, over {found.time_s[-1]:.1f} s.", "lead"),
+            paragraph(_believed(found), "good"),
             paragraph(
                 f"Not identifiable from this recording: {', '.join(missing)}. Their values are mostly what was assumed."
                 if missing
@@ -60,12 +62,31 @@ def fit_report(found: Identified, assumed: TableConfig, source: str, warning: st
                 f"{assumed.motor.resistance_ohm:g} ohm.",
                 "quiet",
             ),
+            heading("The halves of the recording"),
+            table_block(
+                ("constant", "first half", "second half", "difference, standard deviations"),
+                [
+                    (f"{half.name}, {half.unit}", f"{half.first:.4g}", f"{half.second:.4g}", f"{half.apart:.2f}")
+                    for half in halves_of(found)
+                ],
+            ),
             heading("The fit"),
             figure_block(
                 svg_of(_fit_figure(found)),
                 "Recorded and predicted angles, and the distance of the predicted angles from the readings' intervals.",
             ),
         ],
+    )
+
+
+def _believed(found: Identified) -> str:
+    """Return why the fit is to be believed; one that is not has no report."""
+    rms_deg, count_deg = unexplained_rms_deg(found), 360.0 / found.config.counts_per_turn
+    most = max(halves_of(found), key=lambda half: half.apart)
+    return (
+        f"The model explains the recording: beyond rounding {rms_deg / count_deg:.2g} counts rms ({rms_deg:.2g} deg) "
+        f"are left, of {MOST_UNEXPLAINED_DEG / count_deg:.2g} allowed. Both halves give the same constants: "
+        f"the largest difference is {most.apart:.1f} standard deviations ({most.name}), of {MOST_APART:g} allowed."
     )
 
 
@@ -77,15 +98,15 @@ def _fit_figure(found: Identified) -> Figure:
     seen_deg, predicted_deg = (np.where(after_gap, np.nan, angle_deg) for angle_deg in (seen_deg, predicted_deg))
     top.plot(time_s, seen_deg, color=ORANGE, linewidth=2.4, label="recorded")
     top.plot(time_s, predicted_deg, color=BLUE, linewidth=1.0, label="predicted")
-    top.set_title("Compared")
-    top.set_ylabel("deg")
+    top.set_title("Table angle")
+    top.set_ylabel("angle (deg)")
     top.legend(loc="upper right")
-    left = found.unexplained_deg
+    left = found.unexplained_deg * found.config.counts_per_turn / 360.0
     bottom.plot(time_s, left, ".", markersize=2.5, color=BLUE)
-    rms_deg = float(np.sqrt(np.mean(left**2)))
+    rms = float(np.sqrt(np.mean(left**2)))
     bottom.set_title(
-        f"Not explained by rounding: {np.count_nonzero(left)} of {len(left)} readings, rms {rms_deg:.2g} deg"
+        f"Not explained by rounding: {np.count_nonzero(left)} of {len(left)} readings, rms {rms:.2g} counts"
     )
-    bottom.set_ylabel("deg")
-    bottom.set_xlabel("time, s")
+    bottom.set_ylabel("encoder counts")
+    bottom.set_xlabel("time (s)")
     return figure

@@ -13,6 +13,9 @@ from scipy.special import expit
 
 from tools.emulated import Array
 
+Scale = float | Array
+"""Of the prediction error, in deg: of all readings, or (readings,) of each."""
+
 
 class Intervals(NamedTuple):
     """Readings as intervals, in deg."""
@@ -24,13 +27,13 @@ class Intervals(NamedTuple):
         """Return some of the readings."""
         return Intervals(self.low_deg[rows], self.high_deg[rows])
 
-    def log_likelihood(self, angle_deg: Array, scale_deg: float) -> float:
+    def log_likelihood(self, angle_deg: Array, scale_deg: Scale) -> float:
         """Return the logarithm of the probability of all readings, for predicted angles."""
         above, below = self._outside(angle_deg, scale_deg)
         width = (self.high_deg - self.low_deg) / scale_deg
         return float(np.sum(np.log(-np.expm1(-width)) - _softplus(above) - _softplus(below)))
 
-    def derivatives(self, angle_deg: Array, scale_deg: float) -> tuple[Array, Array]:
+    def derivatives(self, angle_deg: Array, scale_deg: Scale) -> tuple[Array, Array]:
         """Return slope and negative curvature of each reading's logarithm by its predicted angle.
 
         The negative curvature is the reading's information about the angle.
@@ -47,7 +50,7 @@ class Intervals(NamedTuple):
         """Return how far angles are above (or, negative, below) the intervals."""
         return angle_deg - np.clip(angle_deg, self.low_deg, self.high_deg)
 
-    def _outside(self, angle_deg: Array, scale_deg: float) -> tuple[Array, Array]:
+    def _outside(self, angle_deg: Array, scale_deg: Scale) -> tuple[Array, Array]:
         """Return the signed distances above the upper and below the lower edges, in scales."""
         return (angle_deg - self.high_deg) / scale_deg, (self.low_deg - angle_deg) / scale_deg
 

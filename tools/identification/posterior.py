@@ -8,7 +8,7 @@ from scipy.linalg import block_diag
 
 from tools.emulated import Array
 from tools.identification.ensemble import Ensemble, regressed
-from tools.identification.likelihood import Intervals
+from tools.identification.likelihood import Intervals, Scale
 
 Predict = Callable[[Array], Array]
 """Returns the angles (deg) that the readings should show, for a vector of constants, without the drift."""
@@ -31,7 +31,7 @@ class Posterior(NamedTuple):
     drift: Array  # (readings, coefficients)
     size: int  # how many constants
 
-    def height(self, vector: Array, predicted_deg: Array, scale_deg: float) -> float:
+    def height(self, vector: Array, predicted_deg: Array, scale_deg: Scale) -> float:
         """Return the logarithm of the posterior."""
         return self.readings.log_likelihood(predicted_deg, scale_deg) - 0.5 * float(vector @ vector)
 
@@ -68,9 +68,15 @@ class LinearPosterior(NamedTuple):
             linear.residual,
         )
 
-    def height(self, move: Array, scale_deg: float) -> float:
+    def height(self, move: Array, scale_deg: Scale) -> float:
         """Return the logarithm of the posterior after a move."""
         return self.posterior.height(self.origin + self.basis @ move, self.still_deg + self.slopes @ move, scale_deg)
+
+    def unexplained_deg(self) -> Array:
+        """Return the standard deviation (readings,) of what the linear model leaves out."""
+        members, size = len(self.residual), self.posterior.size
+        result: Array = np.sqrt(np.sum(self.residual**2, axis=0) / max(members - size - 1, 1))
+        return result
 
     def part(self, rows: slice) -> "LinearPosterior":
         """Return the same for some of the readings only."""
@@ -83,7 +89,7 @@ class LinearPosterior(NamedTuple):
             residual=self.residual[:, rows],
         )
 
-    def information(self, move: Array, scale_deg: float) -> Array:
+    def information(self, move: Array, scale_deg: Scale) -> Array:
         """Return the likelihood's negative Hessian."""
         _, weight = self.posterior.readings.derivatives(self.still_deg + self.slopes @ move, scale_deg)
         result: Array = self.slopes.T @ (self.slopes * weight[:, None])
@@ -98,8 +104,7 @@ class LinearPosterior(NamedTuple):
         _, weight = self.posterior.readings.derivatives(self.still_deg, scale_deg)
         members, size = len(self.residual), self.posterior.size
         information = self.information(np.zeros(self.basis.shape[1]), scale_deg)
-        variance = np.sum(self.residual**2, axis=0) / max(members - size - 1, 1)
-        noise = float(np.sum(weight * variance)) / members
+        noise = float(np.sum(weight * self.unexplained_deg() ** 2)) / members
         noisy = np.zeros_like(information)
         noisy[:size, :size] = noise * np.eye(size)
         values, axes = np.linalg.eigh(information - noisy)
@@ -114,7 +119,7 @@ class LinearPosterior(NamedTuple):
         result: Array = self.basis.T @ self.basis
         return result
 
-    def maximum(self, scale_deg: float, reachable: Array, rounds: int, enough: float) -> Array:
+    def maximum(self, scale_deg: Scale, reachable: Array, rounds: int, enough: float) -> Array:
         """Return the best move within bounds, by Newton's method with Levenberg's damping."""
         move, damping = np.zeros(self.basis.shape[1]), 1e-4
         height = self.height(move, scale_deg)
