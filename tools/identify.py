@@ -23,9 +23,8 @@ from tools.identification.fit_report import fit_report, table_toml, verdict
 from tools.identification.identify_table import identify
 from tools.identification.recorder import record
 from tools.identification.recording import read_recording, write_recording
-from tools.identification.recording_checks import LEAST_DURATION_S, check_line, check_recording
+from tools.identification.recording_checks import LEAST_DURATION_S, LONGEST_DURATION_S, check_line, check_recording
 
-_LONGEST_S = 3600.0
 _NEEDED = ("gain", "time constant", "Coulomb friction")
 
 
@@ -37,7 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _record(options: argparse.Namespace) -> int:
     for name, least, most in (
-        ("duration", LEAST_DURATION_S, _LONGEST_S),
+        ("duration", LEAST_DURATION_S, LONGEST_DURATION_S),
         ("speed", 1.0, inf),
         ("acceleration", 1.0, inf),
         ("baud", 0, inf),

@@ -100,7 +100,7 @@ def _text(path: Path) -> str:
 
 
 def _row(path: Path, line: int, keys: list[str], cells: list[str], separator: str) -> Row:
-    if any(cells[len(keys) :]):
+    if len(keys) > 1 and any(cells[len(keys) :]):  # a single name is not a header; who asks for columns, sees that
         comma = "; with a decimal comma, separate the columns by semicolons" if separator == "," else ""
         raise RecordingError(f"{path}: line {line} has {len(cells)} cells, but there are {len(keys)} columns{comma}")
     return Row(line, dict.fromkeys(keys, "") | dict(zip(keys, cells, strict=False)))

@@ -15,7 +15,7 @@ The names of the columns and commands may be in upper or lower case, the separat
 
 import csv
 from itertools import pairwise
-from math import isnan, nan
+from math import floor, isnan, nan
 from pathlib import Path
 from typing import NamedTuple
 
@@ -127,14 +127,16 @@ def _in_order(table: Table) -> Table:
 
 
 def _wire(table: Table) -> WireRecording:
+    """Return the rows as a recording whose times begin within the first second: a clock may count from anywhere."""
+    begin_s = floor(table.number(table.rows[0], "time_s", table.rows[0].cells["time_s"])) if table.rows else 0
     commands, times, positions, replies = [], [], [], []
     for row in table.rows:
         command = row.cells["command"]
         verb, value = command[:1].upper(), command[1:].strip()
         if verb not in set("HPRSA") or (verb == "H" and value):
             raise table.error(row, f"the command is {command!r}; it must be H, P, R, S or A")
-        time_s = table.number(row, "time_s", row.cells["time_s"])
-        reply_s = table.number(row, _REPLY, row.cells[_REPLY]) if row.cells.get(_REPLY) else nan
+        time_s = table.number(row, "time_s", row.cells["time_s"]) - begin_s
+        reply_s = table.number(row, _REPLY, row.cells[_REPLY]) - begin_s if row.cells.get(_REPLY) else nan
         if verb == "H":
             times.append(time_s)
             replies.append(reply_s)

@@ -9,13 +9,16 @@ from tools.identification.recording import BITS_A_BYTE, DriveRecording, WireReco
 from tools.identification.simulation import commanded_motions, ticks_of, wire_positions_deg
 from tools.identification.timing import timing
 
-LEAST_DURATION_S = 10.0
+LEAST_DURATION_S, LONGEST_DURATION_S = 10.0, 3600.0
 LEAST_READINGS = 300
 LONGEST_GAP_S = 0.5
 _LEAST_TRAVEL_DEG = 5.0
 _STALL_S = 1.0
 _OBEYED_DEG = 0.3
-_STRAY_DEG = 3.0
+_STRAY_DEG = 0.6
+"""How far a table may be from where one with the assumed constants would be. Without a fault, it is at most 0.25."""
+_AS_FAR = (0.9, 1.1)
+"""Shares of the predicted travel that do not look like wrong units."""
 _UNSENT_S, _AT_REST_DEG = 0.3, 0.2
 """For how long, and within which range, the prediction rests when the table moves without a command."""
 _MOST_LATE = 0.3
@@ -32,6 +35,7 @@ def check_recording(config: TableConfig, recording: WireRecording | DriveRecordi
     _check_times(recording.time_s)
     _check_speeds(config, recording.time_s, recording.position_deg)
     if isinstance(recording, WireRecording):
+        _check_span(recording)
         _check_against_commands(config, recording)
     else:
         _check_duty(config, recording)
@@ -56,7 +60,7 @@ def check_line(config: TableConfig, recording: WireRecording) -> None:
 
 def _check_times(time_s: Array) -> None:
     duration_s = float(time_s[-1] - time_s[0]) if len(time_s) else 0.0
-    if duration_s > 3600.0:
+    if duration_s > LONGEST_DURATION_S:
         raise RecordingError(f"the recording lasts {duration_s:.0f} s; are its times in seconds?")
     if duration_s < LEAST_DURATION_S or len(time_s) < LEAST_READINGS:
         raise RecordingError(
@@ -67,6 +71,15 @@ def _check_times(time_s: Array) -> None:
     if steps.min() < 0.0:
         at = int(np.argmin(steps))
         raise RecordingError(f"the clock steps back by {-steps[at]:.3f} s at {time_s[at]:.3f} s")
+
+
+def _check_span(recording: WireRecording) -> None:
+    """Refuse commands far from the readings: the simulation would run up to them."""
+    times = [sent.time_s for sent in recording.commands]
+    for time_s in (min(times, default=0.0), max(times, default=0.0)):
+        away_s = max(recording.time_s[0] - time_s, time_s - recording.time_s[-1])
+        if times and away_s > LONGEST_DURATION_S:
+            raise RecordingError(f"a command at {time_s:.6g} s is {away_s:.3g} s away from the readings: a wrong time?")
 
 
 def _check_gaps(time_s: Array) -> None:
@@ -163,15 +176,20 @@ def _stray(time_s: Array, seen_deg: Array, predicted_deg: Array) -> _Fault | Non
         return None
     first = int(np.argmax(stray))
     at, begin = float(time_s[first]), int(np.searchsorted(time_s, time_s[first] - _UNSENT_S))
+    ratio = float(np.ptp(seen_deg) / max(np.ptp(predicted_deg), 1e-9))
     if np.ptp(predicted_deg[begin : first + 1]) < _AT_REST_DEG:
         reason = "it moves though no command sends it: a P or R command is missing, or the table was turned by hand"
+    elif _AS_FAR[0] < ratio < _AS_FAR[1]:
+        reason = (
+            f"it is up to {np.abs(seen_deg - predicted_deg).max():.2g} deg away: a missing or changed command, a step "
+            "of the clock, mixed-up rows, or a motion that is too fast for this table (record with a lower --speed)"
+        )
     else:
-        ratio = float(np.ptp(seen_deg) / max(np.ptp(predicted_deg), 1e-9))
         reason = (
             f"it travels {ratio:.3g} times as far: wrong units, a step of the clock, a missing command, "
             "or other gears and encoder than configured"
         )
-    return at - _UNSENT_S, f"from {at:.2f} s on the table is not where its commands send it; {reason}"
+    return at, f"from {at:.2f} s on the table is not where its commands send it; {reason}"
 
 
 def _check_duty(config: TableConfig, recording: DriveRecording) -> None:

@@ -2,6 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tools.identification.errors import RecordingError
 from tools.identification.recording import (
@@ -25,6 +26,29 @@ def test_a_recording_comes_back_from_its_file(recording: WireRecording, tmp_path
     assert read.position_deg.tolist() == recording.position_deg.tolist()
     np.testing.assert_allclose(read.reply_s, recording.reply_s, atol=1e-6)
     assert read.resolution_deg == 0.1
+
+
+@pytest.mark.parametrize("begin_s", [-7.25, 5000.0, 1_700_000_000.0])
+def test_the_clock_may_count_from_anywhere(begin_s: float, recording: WireRecording, tmp_path: Path) -> None:
+    path = tmp_path / "trace.csv"
+    write_recording(
+        path,
+        recording._replace(
+            commands=tuple(
+                sent._replace(time_s=sent.time_s + begin_s, reply_s=sent.reply_s + begin_s)
+                for sent in recording.commands
+            ),
+            time_s=recording.time_s + begin_s,
+            reply_s=recording.reply_s + begin_s,
+        ),
+    )
+
+    again = read_recording(path)
+
+    assert isinstance(again, WireRecording)
+    assert 0.0 <= again.commands[0].time_s < 1.0
+    assert_allclose(again.time_s - again.time_s[0], recording.time_s - recording.time_s[0], atol=2e-6)
+    assert_allclose(again.reply_s - again.time_s, recording.reply_s - recording.time_s, atol=2e-6)
 
 
 def test_a_recording_need_not_say_when_the_replies_came(tmp_path: Path) -> None:

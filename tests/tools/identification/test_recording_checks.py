@@ -96,6 +96,18 @@ def without_motion(recording: WireRecording) -> WireRecording:
     return recording._replace(position_deg=0.0 * recording.position_deg)
 
 
+def without_a_move(recording: WireRecording) -> WireRecording:
+    """A P in the middle of a burst is missing; the table swings a little less far there."""
+    moves = [index for index, sent in enumerate(recording.commands) if sent.verb == "P"]
+    missing = moves[len(moves) // 3]
+    return recording._replace(commands=recording.commands[:missing] + recording.commands[missing + 1 :])
+
+
+def with_a_wrong_time(recording: WireRecording) -> WireRecording:
+    last = recording.commands[-1]
+    return recording._replace(commands=(*recording.commands[:-1], last._replace(time_s=1e9, reply_s=1e9 + 0.01)))
+
+
 def without_commands(recording: WireRecording) -> WireRecording:
     return recording._replace(commands=())
 
@@ -120,6 +132,8 @@ def test_a_good_recording_passes(assumed: TableConfig, recording: WireRecording)
         (stalled, "a stall"),
         (without_motion, "moves over 0 deg only"),
         (without_commands, "no P or R command"),
+        (without_a_move, "a missing or changed command"),
+        (with_a_wrong_time, "a command at 1e[+]09 s is .* away from the readings"),
     ],
 )
 def test_a_useless_recording_is_refused(
