@@ -7,7 +7,7 @@ from emulator.config.table_config import TableConfig
 from tools.config_file import config_toml
 from tools.html_report import BLUE, ORANGE, figure_block, heading, new_figure, page, paragraph, svg_of, table_block
 from tools.identification.constants import Constant
-from tools.identification.fit_checks import MOST_APART, MOST_UNEXPLAINED_DEG, halves_of, unexplained_rms_deg
+from tools.identification.fit_checks import MOST_UNEXPLAINED_DEG, halves_of, unexplained_rms_deg
 from tools.identification.identify_table import Identified
 from tools.identification.parameters import PARAMETERS
 
@@ -64,9 +64,15 @@ def fit_report(found: Identified, assumed: TableConfig, source: str, warning: st
             ),
             heading("The halves of the recording"),
             table_block(
-                ("constant", "first half", "second half", "difference, standard deviations"),
+                ("constant", "first half", "second half", "difference, standard deviations", "allowed"),
                 [
-                    (f"{half.name}, {half.unit}", f"{half.first:.4g}", f"{half.second:.4g}", f"{half.apart:.2f}")
+                    (
+                        f"{half.name}, {half.unit}",
+                        f"{half.first:.4g}",
+                        f"{half.second:.4g}",
+                        f"{half.apart:.2f}",
+                        f"{half.allowed:g}",
+                    )
                     for half in halves_of(found)
                 ],
             ),
@@ -82,11 +88,11 @@ def fit_report(found: Identified, assumed: TableConfig, source: str, warning: st
 def _believed(found: Identified) -> str:
     """Return why the fit is to be believed; one that is not has no report."""
     rms_deg, count_deg = unexplained_rms_deg(found), 360.0 / found.config.counts_per_turn
-    most = max(halves_of(found), key=lambda half: half.apart)
+    most = max(halves_of(found), key=lambda half: half.apart / half.allowed)
     return (
         f"The model explains the recording: beyond rounding {rms_deg / count_deg:.2g} counts rms ({rms_deg:.2g} deg) "
         f"are left, of {MOST_UNEXPLAINED_DEG / count_deg:.2g} allowed. Both halves give the same constants: "
-        f"the largest difference is {most.apart:.1f} standard deviations ({most.name}), of {MOST_APART:g} allowed."
+        f"the largest difference is {most.apart:.1f} standard deviations ({most.name}), of {most.allowed:g} allowed."
     )
 
 

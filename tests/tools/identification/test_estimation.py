@@ -89,3 +89,19 @@ def test_a_model_that_explains_the_readings_badly_widens_the_interval() -> None:
     widths = [np.sqrt(np.diag(found(problem).covariance)) for problem in (good, bad)]
 
     assert (widths[1] > 3.0 * widths[0]).all()
+
+
+def test_a_search_that_leaves_a_little_unexplained_is_repeated() -> None:
+    def simulations(disturbance_deg: float) -> int:
+        made: list[Array] = []
+
+        def counted(vector: Array) -> Array:
+            made.append(vector)
+            return swing(vector)
+
+        found(Posterior(read(swing(np.zeros(3)) + disturbance_deg * np.sin(90.0 * _TIME)), counted, _NO_DRIFT, 3))
+        return len(made)
+
+    once = simulations(0.0)
+    assert simulations(0.004) > 1.7 * once
+    assert simulations(0.2) < 1.3 * once  # not a good recording: no search helps
