@@ -109,21 +109,25 @@ def _parser() -> argparse.ArgumentParser:
         "record", help="move a table and record its answers (within a quarter of a turn, by default)"
     )
     recorder.add_argument("--port", required=True, metavar="URL", help="/dev/ttyUSB0, socket://host:7000, emulator://")
-    recorder.add_argument("--out", required=True, type=Path, metavar="FILE", help="the CSV to write")
-    recorder.add_argument("--baud", type=int, default=9600)
-    recorder.add_argument("--duration", type=float, default=60.0, metavar="S", help="length of the recording (60)")
-    recorder.add_argument("--speed", type=float, default=40.0, metavar="DEG_S", help="the greatest to use (40)")
+    recorder.add_argument("--out", required=True, type=Path, metavar="FILE", help="CSV file to write")
+    recorder.add_argument("--baud", type=int, default=9600, help="baud rate (default: 9600)")
     recorder.add_argument(
-        "--acceleration", type=float, default=100.0, metavar="DEG_S2", help="the greatest to use (100)"
+        "--duration", type=float, default=60.0, metavar="S", help="length of the recording (default: 60)"
     )
-    recorder.add_argument("--config", type=Path, help="what is known of the table: the tick of its controller")
-    recorder.add_argument("--seed", type=int, default=0, help="of the irregular durations")
+    recorder.add_argument("--speed", type=float, default=40.0, metavar="DEG_S", help="maximum speed (default: 40)")
+    recorder.add_argument(
+        "--acceleration", type=float, default=100.0, metavar="DEG_S2", help="maximum acceleration (default: 100)"
+    )
+    recorder.add_argument("--config", type=Path, help="known constants of the table: the tick rate of its controller")
+    recorder.add_argument("--seed", type=int, default=0, help="random seed of the swings (default: 0)")
     recorder.set_defaults(run=_record)
     fitter = commands.add_parser("fit", help="estimate the constants of the recorded table")
     fitter.add_argument("recording", type=Path, help="a CSV of `record`, of the emulator's trace, or of a drive")
-    fitter.add_argument("--out", required=True, type=Path, metavar="FILE", help="the TOML to write; a report beside it")
     fitter.add_argument(
-        "--config", type=Path, help="what is known of the table: gains, encoder, datasheet (the default table)"
+        "--out", required=True, type=Path, metavar="FILE", help="TOML file to write; the report is written beside it"
+    )
+    fitter.add_argument(
+        "--config", type=Path, help="known constants: gains, encoder, datasheet (default: the default table)"
     )
     fitter.set_defaults(run=_fit)
     return parser
