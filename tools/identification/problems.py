@@ -41,6 +41,9 @@ _DRIVE_DELAY_TICKS = (1.0, 1.0)
 
 _DRIVE_WINDOW_S = 0.008
 
+_WIDEST_GAP_DEG = 1.5
+"""A drive's readings count once the table has moved so far: before, it is unknown where the teeth stand in the gap."""
+
 
 class Prior(NamedTuple):
     """What is known beforehand of each component of the vector: mean and standard deviation."""
@@ -130,16 +133,17 @@ def _drive_problem(config: TableConfig, recording: DriveRecording) -> Problem:
     tick_hz = config.control.tick_hz
     duty, position_deg = ticks_of(recording, tick_hz)
     window = max(1, round(_DRIVE_WINDOW_S * tick_hz))
-    seen_deg = np.diff(position_deg[::window])
+    first = int(np.argmax(np.abs(position_deg[::window] - position_deg[0]) > _WIDEST_GAP_DEG))
+    seen_deg = np.diff(position_deg[::window])[first:]
     count_deg = 1.0 / config.counts_per_deg
 
     def predict(vector: Array) -> Array:
         *logarithms, delay_ticks = vector
         positions = drive_positions_deg(with_logarithms(config, logarithms), duty, max(delay_ticks, 0.0))
-        made: Array = np.diff(positions[::window])
+        made: Array = np.diff(positions[::window])[first:]
         return made
 
     prior = _prior(config, _DRIVE_DELAY_TICKS)
-    time_s = np.arange(1, len(seen_deg) + 1) * window / tick_hz
+    time_s = (first + np.arange(1, len(seen_deg) + 1)) * window / tick_hz
     readings, no_drift = Intervals(seen_deg - count_deg, seen_deg + count_deg), np.empty((len(seen_deg), 0))
     return _problem(time_s, seen_deg, prior, readings, predict, no_drift)
