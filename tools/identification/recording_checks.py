@@ -178,11 +178,14 @@ def _stray(time_s: Array, seen_deg: Array, predicted_deg: Array) -> _Fault | Non
     at, begin = float(time_s[first]), int(np.searchsorted(time_s, time_s[first] - _UNSENT_S))
     ratio = float(np.ptp(seen_deg) / max(np.ptp(predicted_deg), 1e-9))
     if np.ptp(predicted_deg[begin : first + 1]) < _AT_REST_DEG:
-        reason = "it moves though no command sends it: a P or R command is missing, or the table was turned by hand"
+        reason = (
+            "it moves though no command sends it: a P or R command is missing, the clock was set, readings are mixed "
+            "up, or the table was turned by hand"
+        )
     elif _AS_FAR[0] < ratio < _AS_FAR[1]:
         reason = (
             f"it is up to {np.abs(seen_deg - predicted_deg).max():.2g} deg away: a missing or changed command, a step "
-            "of the clock, mixed-up rows, or a motion that is too fast for this table (record with a lower --speed)"
+            "of the clock, mixed-up rows, a sign, or motion too fast for the table (record with a lower --speed)"
         )
     else:
         reason = (
