@@ -65,6 +65,7 @@ PROTOCOL_EDGE = {
     "protocol/clock.py": {"time"},
     "protocol/interrupts.py": {"signal", "threading"},
     "protocol/kept_code.py": {"os", "pathlib", "time"},
+    "protocol/conformance/commands/command_line.py": {"os"},
     "protocol/progress.py": {"os"},
     "protocol/quiet_start.py": {"os", "signal"},
     "protocol/conformance/__main__.py": {"pathlib"},

@@ -158,4 +158,4 @@ def test_the_noise_does_not_depend_on_the_grid() -> None:
 
     found = [float(loop_figures(Loops.of([config], size), gains).noise_duty[0]) for size in (256, 512, 4096)]
 
-    assert found == pytest.approx([found[-1]] * 3, rel=1e-4)
+    assert found == pytest.approx([found[-1]] * 3, rel=1e-3)

@@ -1,4 +1,5 @@
 import re
+from itertools import pairwise
 
 import pytest
 
@@ -45,7 +46,8 @@ def test_the_report_shows_what_is_not_bounded_and_compares_with_other_bounds_and
     assert asked[-1] == "asked"
     lags = [float(cells(html, f"{100 * trade.noise_duty:.3g}")[0]) for trade in tuning.trades if trade.feasible]
     assert len(lags) > 2
-    assert lags == sorted(lags, reverse=True)  # more noise, less lag
+    assert all(after <= 1.01 * before for before, after in pairwise(lags))  # more noise, less lag
+    assert lags[-1] < 0.6 * lags[0]
     for name in ("SIMC PI", "AMIGO PI", "AMIGO PID", "ramp set", "constant-speed set"):
         assert len(cells(html, name)) >= 9
 
