@@ -107,7 +107,7 @@ def _fit_figure(found: Identified) -> Figure:
     top.set_title("Table angle")
     top.set_ylabel("angle (deg)")
     top.legend(loc="upper right")
-    left = found.unexplained_deg * found.config.counts_per_turn / 360.0
+    left = found.unexplained_deg * found.config.counts_per_deg
     bottom.plot(time_s, left, ".", markersize=2.5, color=BLUE)
     rms = float(np.sqrt(np.mean(left**2)))
     bottom.set_title(
