@@ -10,8 +10,8 @@ import serial
 
 from emulator.config.table_config import TableConfig, load_config
 from emulator.config.toml_section import ConfigError
-from emulator.table.status import TableStatus
 from emulator.table.table import Table
+from protocol.bench import TableStatus
 
 __all__ = ["ConfigError", "Table", "TableConfig", "TableStatus", "load_config"]
 

@@ -2,59 +2,20 @@
 
 import argparse
 import json
-import socket
 import sys
 from pathlib import Path
-from typing import Any
 
-from emulator.server.control_commands import COMMANDS, RequestError, parsed_line
+from emulator.server.control_commands import COMMANDS
+from protocol.bench import BenchError
+from protocol.control_channel import request
 
-_TIMEOUT_S = 5.0
-_LONGEST_ANSWER = 1 << 16
+__all__ = ["main", "request"]
+
 _EXAMPLE = """example:
   python -m emulator --pty --control table.control
   python -m emulator.control_client table.control trigger
   python -m emulator.control_client table.control load-torque 0.3
 """
-
-
-class ControlError(Exception):
-    """The stand-in cannot be reached, or refused the request; the message says why."""
-
-
-def request(path: Path, command: str, **parameters: float) -> dict[str, Any]:
-    """Return the answer to one command.
-
-    Raises:
-        ControlError: nobody listens at `path`, something else answers there, or the request is refused.
-    """
-    line = json.dumps({"command": command, **parameters}).encode() + b"\n"
-    try:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-            connection.settimeout(_TIMEOUT_S)
-            connection.connect(str(path))
-            connection.sendall(line)
-            with connection.makefile("rb") as replies:
-                reply = replies.readline(_LONGEST_ANSWER)
-    except OSError as error:
-        raise ControlError(f"{path}: {error}; start an emulator with --control {path}") from error
-    if not reply:
-        raise ControlError(f"{path}: the stand-in hung up without an answer")
-    result = _result(reply)
-    if result is None:
-        raise ControlError(f"{path}: {reply[:80]!r} is no answer of a stand-in; is this its control channel?")
-    if not result.pop("ok", False):
-        raise ControlError(str(result["error"]))
-    return result
-
-
-def _result(reply: bytes) -> dict[str, Any] | None:
-    """Return an answer's fields, or None where it is none."""
-    try:
-        fields = parsed_line(reply)
-    except RequestError:
-        return None
-    return fields if isinstance(fields, dict) and ("error" in fields or fields.get("ok") is True) else None
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -64,7 +25,7 @@ def main(arguments: list[str] | None = None) -> int:
     parameters = {name: value for name, value in given.items() if value is not None}
     try:
         result = request(parsed.path, parsed.command, **parameters)
-    except ControlError as error:
+    except BenchError as error:
         sys.stderr.write(f"control_client: {error}\n")
         return 2
     if result:

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-from emulator.table.status import TableStatus
+from protocol.bench import TableStatus
 
 if TYPE_CHECKING:
     import numpy as np

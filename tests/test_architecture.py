@@ -1,6 +1,7 @@
 """The shape of the whole: imports run one way, and clocks, ports and threads stay at the edge."""
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
@@ -63,6 +64,7 @@ EDGE_MODULES = {
 
 PROTOCOL_EDGE = {
     "protocol/clock.py": {"time"},
+    "protocol/control_channel.py": {"pathlib", "socket"},
     "protocol/interrupts.py": {"signal", "threading"},
     "protocol/kept_code.py": {"os", "pathlib", "time"},
     "protocol/conformance/commands/command_line.py": {"os"},
@@ -79,7 +81,7 @@ PROTOCOL_EDGE = {
     "protocol/conformance/results/record.py": {"pathlib"},
     "protocol/conformance/commands/replay_run.py": {"pathlib"},
     "protocol/conformance/results/report.py": {"pathlib"},
-    "protocol/conformance/bench/stand.py": {"pathlib", "socket"},
+    "protocol/conformance/bench/stand.py": {"pathlib"},
     "protocol/conformance/commands/suite_run.py": {"datetime", "os", "pathlib"},
     "protocol/serial_port.py": {"serial"},
     "protocol/whole_file.py": {"os", "pathlib"},
@@ -200,6 +202,57 @@ def test_the_protocol_touches_clock_and_port_at_its_edge_only() -> None:
 def test_the_emulator_touches_clock_ports_and_files_at_its_edge_only() -> None:
     touched = {Path(source).stem for source in touched_at_the_edge("emulator")}
     assert touched - {"__init__", "protocol_emulator"} <= EMULATOR_EDGE  # those two only teach pyserial a port
+
+
+TABLE_NAMES = ("table", "bench", "stand", "view", "simulated", "status", "snapshot", "stand_in")
+"""What a table, its bench, or a look at it is called, alone or as the end of a name."""
+
+
+def names_a_table(name: str) -> bool:
+    return name.rsplit("_", maxsplit=1)[-1] in TABLE_NAMES or name.startswith("table_")
+
+
+def untyped_tables(tree: ast.AST) -> Iterator[str]:
+    """Yield where a table is `Any`, or got at by its name, where types cannot follow."""
+    for node in ast.walk(tree):
+        name, annotation = "", None
+        match node:
+            case ast.arg():
+                name, annotation = node.arg, node.annotation
+            case ast.FunctionDef():
+                name, annotation = node.name, node.returns
+            case ast.AnnAssign():
+                name, annotation = ast.unparse(node.target).rpartition(".")[2], node.annotation
+            case ast.Call(func=ast.Name("getattr"), args=[_, ast.Constant("table"), *_]):
+                yield ast.unparse(node)
+        if annotation is not None and names_a_table(name) and re.search(r"\bAny\b", ast.unparse(annotation)):
+            yield f"{name}: {ast.unparse(annotation)}"
+
+
+@pytest.mark.parametrize("package", [*MAY_IMPORT, "tests"])
+def test_no_table_is_untyped(package: str) -> None:
+    """mypy holds planner, kit and tools to `protocol.bench` only where nothing of a table is `Any`."""
+    found = {
+        source.relative_to(ROOT).as_posix(): places
+        for source in (ROOT / package).rglob("*.py")
+        if (places := list(untyped_tables(ast.parse(source.read_text(encoding="utf-8")))))
+    }
+    assert found.keys() == ({"protocol/bench.py"} if package == "protocol" else set()), found
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "def run(table: Any) -> None: ...",
+        "def run(*, simulated_table: 'Any | None' = None) -> None: ...",
+        "class Port:\n    table: Any",
+        "self._table: list[Any] = []",
+        "def bench(port: object) -> Any: ...",
+        "table = getattr(port, 'table', None)",
+    ],
+)
+def test_an_untyped_table_is_seen(source: str) -> None:
+    assert len(list(untyped_tables(ast.parse(source)))) == 1
 
 
 def test_the_stand_in_starts_with_neither_numpy_nor_numba() -> None:

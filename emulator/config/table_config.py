@@ -12,10 +12,11 @@ from typing import Any, Self
 
 from emulator.config.gear_ratio import simplest_fraction
 from emulator.config.toml_section import ConfigError, merged, quantity, section
-from emulator.faults.fault import Fault, FaultError, fault_from
+from emulator.faults.fault import FaultError, fault_from
 from emulator.faults.parameter import brief
 from emulator.firmware.fixed_point import ERROR_BITS, ERROR_MAX, gain_registers, motion_bits
 from emulator.int32 import INT32_MAX
+from protocol.bench import Fault
 from protocol.data_file import DataFileError, read_toml
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")

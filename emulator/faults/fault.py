@@ -1,75 +1,175 @@
-"""What can go wrong with a table: the faults by name, and when each strikes.
+"""What can go wrong with a table: the faults by name, and the numbers that each takes.
 
 The same names and numbers are used in a configuration file, on the control channel and by `Table.inject`. When a fault
-holds is in `fault_schedule`; what it does is in `line_faults`, `drive_faults` and `trigger_faults`.
+holds is in `schedule`; what it does is in `line_faults`, `drive_faults` and `trigger_faults`.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import MISSING, dataclass, fields
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from emulator.faults.parameter import Parameter, brief
+from protocol.bench import Fault
 
 
 class FaultError(ValueError):
     """A fault that cannot be; the message says what is allowed."""
 
 
-class FaultKind(NamedTuple):
-    """One kind of fault; one that strikes once does so at the next occasion, and is over."""
+# The annotation of a number holds the closed interval that it must lie in, and its help.
+ByteProbability = Annotated[float, 0.0, 1.0, "of each byte"]
+EdgeProbability = Annotated[float, 0.0, 1.0, "of each edge"]
+Delay = Annotated[float, 0.0, 3600.0, "by how long"]
+LineDirection = Annotated[int, -1, 1, "1: towards the table, -1: towards the client, 0 (default): both"]
 
-    help: str
-    parameters: tuple[Parameter, ...] = ()
-    strikes_once: bool = False
+
+@dataclass(frozen=True, kw_only=True)
+class Drop(Fault):
+    """Bytes are lost on the line."""
+
+    kind = "drop"
+    probability: ByteProbability
+    direction: LineDirection = 0
 
 
-_PROBABILITY = Parameter("probability", 0.0, 1.0, "of each byte")
-_DIRECTION = Parameter(
-    "direction", -1, 1, "1: towards the table, -1: towards the client, 0 (default): both", optional=True, whole=True
-)
+@dataclass(frozen=True, kw_only=True)
+class Flip(Fault):
+    """A bit of a byte turns over on the line."""
 
-KINDS: Mapping[str, FaultKind] = {
-    "drop": FaultKind("bytes are lost on the line", (_PROBABILITY, _DIRECTION)),
-    "flip": FaultKind("a bit of a byte turns over on the line", (_PROBABILITY, _DIRECTION)),
-    "delay": FaultKind("all replies come later", (Parameter("seconds", 0.0, 3600.0, "by how long"),)),
-    "half-reply": FaultKind(
-        "the next reply ends before its end",
-        (Parameter("bytes", 0, 32, "that are sent of it", whole=True),),
-        strikes_once=True,
-    ),
-    "late-reply": FaultKind(
-        "the next reply comes late, and those after it behind it",
-        (Parameter("seconds", 0.0, 3600.0, "by how long"),),
-        strikes_once=True,
-    ),
-    "silence": FaultKind("the table carries out what it hears and says nothing"),
-    "hang-up": FaultKind("the port goes away; it comes back when the fault ends"),
-    "wrong-baud": FaultKind(
-        "the table listens and talks at another rate", (Parameter("baud", 50, 4_000_000, "of it", whole=True),)
-    ),
-    "stall": FaultKind("something holds the table"),
-    "extra-load": FaultKind(
-        "a torque loads the table",
-        (Parameter("torque_Nm", -1000.0, 1000.0, "at its axis; positive resists forward rotation"),),
-    ),
-    "supply-sag": FaultKind("the motor's supply falls", (Parameter("supply_V", 0.0, 100.0, "that is left"),)),
-    "stuck-pwm": FaultKind("the bridge keeps one duty", (Parameter("duty", -1.0, 1.0, "that it keeps"),)),
-    "one-sided": FaultKind(
-        "the bridge drives in one direction only",
-        (Parameter("direction", -1, 1, "1: forwards, -1: backwards, 0: neither", whole=True),),
-    ),
-    "lost-counts": FaultKind("encoder edges are not counted", (_PROBABILITY._replace(help="of each edge"),)),
-    "swapped-encoder": FaultKind("the encoder's A and B are swapped: it counts the wrong way"),
-    "dead-encoder": FaultKind("the encoder counts nothing"),
-    "missed-trigger": FaultKind("trigger edges are not seen", (_PROBABILITY._replace(help="of each edge"),)),
-    "bounced-trigger": FaultKind(
-        "each trigger edge is followed by others",
-        (
-            Parameter("edges", 1, 100, "that follow", whole=True),
-            Parameter("within_s", 0.001, 10.0, "after it, spread by chance"),
-        ),
-    ),
-}
+    kind = "flip"
+    probability: ByteProbability
+    direction: LineDirection = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class LateReplies(Fault):
+    """All replies come later."""
+
+    kind = "delay"
+    seconds: Delay
+
+
+@dataclass(frozen=True, kw_only=True)
+class HalfReply(Fault):
+    """The next reply ends before its end."""
+
+    kind = "half-reply"
+    bytes: Annotated[int, 0, 32, "that are sent of it"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LateReply(Fault):
+    """The next reply comes late, and those after it behind it."""
+
+    kind = "late-reply"
+    seconds: Delay
+
+
+class Silence(Fault):
+    """The table carries out what it hears and says nothing."""
+
+    kind = "silence"
+
+
+class HangUp(Fault):
+    """The port goes away; it comes back when the fault ends."""
+
+    kind = "hang-up"
+
+
+@dataclass(frozen=True, kw_only=True)
+class WrongBaud(Fault):
+    """The table listens and talks at another rate."""
+
+    kind = "wrong-baud"
+    baud: Annotated[int, 50, 4_000_000, "of it"]
+
+
+class Stall(Fault):
+    """Something holds the table."""
+
+    kind = "stall"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExtraLoad(Fault):
+    """A torque loads the table."""
+
+    kind = "extra-load"
+    torque_Nm: Annotated[float, -1000.0, 1000.0, "at its axis; positive resists forward rotation"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SupplySag(Fault):
+    """The motor's supply falls."""
+
+    kind = "supply-sag"
+    supply_V: Annotated[float, 0.0, 100.0, "that is left"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StuckPwm(Fault):
+    """The bridge keeps one duty."""
+
+    kind = "stuck-pwm"
+    duty: Annotated[float, -1.0, 1.0, "that it keeps"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class OneSided(Fault):
+    """The bridge drives in one direction only."""
+
+    kind = "one-sided"
+    direction: Annotated[int, -1, 1, "1: forwards, -1: backwards, 0: neither"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LostCounts(Fault):
+    """Encoder edges are not counted."""
+
+    kind = "lost-counts"
+    probability: EdgeProbability
+
+
+class SwappedEncoder(Fault):
+    """The encoder's A and B are swapped: it counts the wrong way."""
+
+    kind = "swapped-encoder"
+
+
+class DeadEncoder(Fault):
+    """The encoder counts nothing."""
+
+    kind = "dead-encoder"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MissedTrigger(Fault):
+    """Trigger edges are not seen."""
+
+    kind = "missed-trigger"
+    probability: EdgeProbability
+
+
+@dataclass(frozen=True, kw_only=True)
+class BouncedTrigger(Fault):
+    """Each trigger edge is followed by others."""
+
+    kind = "bounced-trigger"
+    edges: Annotated[int, 1, 100, "that follow"]
+    within_s: Annotated[float, 0.001, 10.0, "after it, spread by chance"]
+
+
+STRIKES_ONCE = (HalfReply, LateReply)
+"""These strike at the next occasion, and are over."""
+
+KINDS: Mapping[str, type[Fault]] = {
+    kind.kind: kind
+    for kind in (
+        Drop, Flip, LateReplies, HalfReply, LateReply, Silence, HangUp, WrongBaud, Stall, ExtraLoad, SupplySag,
+        StuckPwm, OneSided, LostCounts, SwappedEncoder, DeadEncoder, MissedTrigger, BouncedTrigger,
+    )
+}  # fmt: skip
 """Every fault by its name."""
 
 SCHEDULE: tuple[Parameter, ...] = (
@@ -87,25 +187,22 @@ SCHEDULE: tuple[Parameter, ...] = (
 """What every fault takes besides its own numbers."""
 
 
-@dataclass(frozen=True)
-class Fault:
-    """A fault with its numbers, and when it begins and ends; see `fault_from`."""
-
-    kind: str
-    values: tuple[tuple[str, float], ...] = ()
-    at_s: float | None = None
-    at_command: int | None = None
-    for_s: float | None = None
-
-    def value(self, name: str) -> float:
-        """Return one of its numbers; an optional one that was left out is 0."""
-        return dict(self.values).get(name, 0.0)
+def help_of(kind: str) -> str:
+    """Return what a fault does, as half a sentence."""
+    sentence = KINDS[kind].__doc__ or kind
+    return sentence[0].lower() + sentence[1:].rstrip(".")
 
 
 def parameters_of(kind: str) -> tuple[Parameter, ...]:
     """Return all that a fault takes: its own numbers, and its schedule; one that strikes once has no duration."""
-    own, once = KINDS[kind].parameters, KINDS[kind].strikes_once
-    return own + tuple(parameter for parameter in SCHEDULE if not (once and parameter.name == "for_s"))
+    defaults = {each.name: each.default for each in fields(KINDS[kind])}
+    own = []
+    for name, hint in get_type_hints(KINDS[kind], include_extras=True).items():
+        if get_origin(hint) is Annotated:
+            number, least, most, words = get_args(hint)
+            own.append(Parameter(name, least, most, words, defaults[name] is not MISSING, number is int))
+    once = issubclass(KINDS[kind], STRIKES_ONCE)
+    return (*own, *(parameter for parameter in SCHEDULE if not (once and parameter.name == "for_s")))
 
 
 def fault_from(kind: object, given: Mapping[str, object]) -> Fault:
@@ -117,16 +214,13 @@ def fault_from(kind: object, given: Mapping[str, object]) -> Fault:
     if not isinstance(kind, str) or kind not in KINDS:
         raise FaultError(f"{brief(kind)} is not a fault; there are {', '.join(KINDS)}")
     _check_numbers(kind, given)
-    numbers = {name: float(value) for name, value in given.items() if isinstance(value, int | float)}
-    own = (parameter.name for parameter in KINDS[kind].parameters)
-    at_command = numbers.get("at_command")
-    return Fault(
-        kind,
-        tuple((name, numbers[name]) for name in own if name in numbers),
-        numbers.get("at_s"),
-        None if at_command is None else int(at_command),
-        numbers.get("for_s"),
-    )
+    whole = {parameter.name: parameter.whole for parameter in parameters_of(kind)}
+    values: dict[str, Any] = {
+        name: int(value) if whole[name] else float(value)
+        for name, value in given.items()
+        if isinstance(value, int | float)
+    }
+    return KINDS[kind](**values)
 
 
 def _check_numbers(kind: str, given: Mapping[str, object]) -> None:

@@ -2,6 +2,7 @@
 
 from collections import deque
 
+from emulator.faults.fault import Drop, Flip, HalfReply, LateReplies, LateReply, Silence, WrongBaud
 from emulator.faults.schedule import FaultSchedule
 from emulator.line.framing import read_at_rate
 
@@ -34,16 +35,15 @@ class LineFaults:
         faults = self._faults
         if not faults.present:
             return data
-        if faults.hangs_up or (direction == TO_CLIENT and faults.holding("silence")):
+        if faults.hangs_up or (direction == TO_CLIENT and faults.holding(Silence)):
             return b""
-        if (fault := faults.holding("wrong-baud")) and self._baud:
-            table_baud = int(fault.value("baud"))
-            sender, receiver = (self._baud, table_baud) if direction == TO_TABLE else (table_baud, self._baud)
+        if (wrong := faults.holding(WrongBaud)) and self._baud:
+            sender, receiver = (self._baud, wrong.baud) if direction == TO_TABLE else (wrong.baud, self._baud)
             data = read_at_rate(data, sender, receiver)
-        if (fault := faults.holding("drop")) and fault.value("direction") in {0.0, direction}:
-            data = bytes(byte for byte in data if not faults.strikes(fault.value("probability")))
-        if (fault := faults.holding("flip")) and fault.value("direction") in {0.0, direction}:
-            data = bytes(self._flipped(byte, fault.value("probability")) for byte in data)
+        if (drop := faults.holding(Drop)) and drop.direction in {0, direction}:
+            data = bytes(byte for byte in data if not faults.strikes(drop.probability))
+        if (flip := faults.holding(Flip)) and flip.direction in {0, direction}:
+            data = bytes(self._flipped(byte, flip.probability) for byte in data)
         return data
 
     def on_a_reply(self, reply: bytes, tick: int) -> bytes:
@@ -51,11 +51,11 @@ class LineFaults:
         faults = self._faults
         if not (faults.present or self._held):
             return reply
-        if fault := faults.spent("half-reply"):
-            reply = reply[: int(fault.value("bytes"))]
-        late_s = fault.value("seconds") if (fault := faults.spent("late-reply")) else 0.0
-        if fault := faults.holding("delay"):
-            late_s += fault.value("seconds")
+        if half := faults.spent(HalfReply):
+            reply = reply[: half.bytes]
+        late_s = late.seconds if (late := faults.spent(LateReply)) else 0.0
+        if delay := faults.holding(LateReplies):
+            late_s += delay.seconds
         # A reply never overtakes the one before it.
         due = max(tick + round(late_s * self._tick_hz), self._held[-1][0] if self._held else tick)
         if due == tick:

@@ -6,12 +6,16 @@ and is seeded: the same faults strike the same bytes at the same ticks.
 
 from collections.abc import Iterable
 from random import Random
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
-from emulator.faults.fault import KINDS, Fault, FaultError
+from emulator.faults.fault import STRIKES_ONCE, FaultError, HangUp
+from protocol.bench import Fault
 
 MOST_PLANS = 1000
 """Faults that may wait at once: each is looked at whenever one begins."""
+
+
+Kind = TypeVar("Kind", bound=Fault)
 
 
 class Plan(NamedTuple):
@@ -41,7 +45,7 @@ class FaultSchedule:
         self.chance = Random(f"faults {seed}")  # noqa: S311  # no secret
         self._tick_hz = tick_hz
         self._plans: list[Plan] = []
-        self._active: dict[str, Active] = {}
+        self._active: dict[type[Fault], Active] = {}
         self._lines_heard = 0
         for fault in faults:
             self.inject(fault, 0)
@@ -54,7 +58,7 @@ class FaultSchedule:
     @property
     def hangs_up(self) -> bool:
         """Whether the port has gone away."""
-        return "hang-up" in self._active
+        return HangUp in self._active
 
     @property
     def next_tick(self) -> int | None:
@@ -102,20 +106,21 @@ class FaultSchedule:
         self._begin([plan for plan in self._plans if plan.fault.at_command == self._lines_heard], tick)
         return was_up and self.hangs_up
 
-    def holds_any(self, kinds: frozenset[str]) -> bool:
+    def holds_any(self, kinds: frozenset[type[Fault]]) -> bool:
         """Return whether a fault of one of these kinds holds."""
         return not kinds.isdisjoint(self._active)
 
-    def holding(self, kind: str) -> Fault | None:
+    def holding(self, kind: type[Kind]) -> Kind | None:
         """Return the fault of a kind that holds, if there is one."""
         one = self._active.get(kind)
-        return None if one is None else one.fault
+        return one.fault if one is not None and isinstance(one.fault, kind) else None
 
-    def spent(self, kind: str) -> Fault | None:
+    def spent(self, kind: type[Kind]) -> Kind | None:
         """Return a fault that strikes once, which is over with this."""
-        assert KINDS[kind].strikes_once
-        one = self._active.pop(kind, None)
-        return None if one is None else one.fault
+        assert issubclass(kind, STRIKES_ONCE)
+        fault = self.holding(kind)
+        self._active.pop(kind, None)
+        return fault
 
     def strikes(self, probability: float) -> bool:
         """Draw whether a fault strikes this time."""
@@ -125,4 +130,4 @@ class FaultSchedule:
         for plan in plans:
             self._plans.remove(plan)
             end = None if plan.ticks is None else tick + plan.ticks
-            self._active[plan.fault.kind] = Active(plan.fault, end)
+            self._active[type(plan.fault)] = Active(plan.fault, end)

@@ -2,6 +2,7 @@
 
 import math
 
+from emulator.faults.fault import BouncedTrigger, MissedTrigger
 from emulator.faults.schedule import FaultSchedule
 
 
@@ -16,15 +17,15 @@ class TriggerFaults:
 
     def misses_edge(self) -> bool:
         """Return whether this edge is not seen."""
-        fault = self._faults.holding("missed-trigger")
-        return fault is not None and self._faults.strikes(fault.value("probability"))
+        fault = self._faults.holding(MissedTrigger)
+        return fault is not None and self._faults.strikes(fault.probability)
 
     def bounces(self, tick: int) -> list[tuple[int, float]]:
         """Return the edges that follow one in this tick, each a tick and a fraction; they do not bounce themselves."""
-        fault = self._faults.holding("bounced-trigger")
+        fault = self._faults.holding(BouncedTrigger)
         if fault is None or tick < self._bounce_end_tick:
             return []
-        span_ticks = fault.value("within_s") * self._tick_hz
+        span_ticks = fault.within_s * self._tick_hz
         self._bounce_end_tick = tick + math.ceil(span_ticks) + 1
-        times = [tick + self._faults.chance.random() * span_ticks for _ in range(int(fault.value("edges")))]
+        times = [tick + self._faults.chance.random() * span_ticks for _ in range(fault.edges)]
         return [(math.floor(time), time - math.floor(time)) for time in times]

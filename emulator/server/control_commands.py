@@ -8,14 +8,19 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
 
-from emulator.faults.fault import KINDS, Fault, FaultError, fault_from, parameters_of
+from emulator.faults.fault import KINDS, FaultError, fault_from, help_of, parameters_of
 from emulator.faults.parameter import Parameter, brief
 from emulator.server.clock import TIME_SCALE
-from emulator.table.status import TableStatus
+from protocol.bench import Bench
 
 
 class Stand(Protocol):
-    """What commands act on: the running stand-in."""
+    """What commands act on: a table, and the running server that alone knows the clock."""
+
+    @property
+    def table(self) -> Bench:
+        """The table; to trigger it at its exact instant is for the server."""
+        ...
 
     @property
     def time_scale(self) -> float:
@@ -26,32 +31,8 @@ class Stand(Protocol):
         """Latch the encoder at this instant."""
         ...
 
-    def status(self) -> TableStatus:
-        """Return the table as it is at this instant."""
-        ...
-
-    def set_load_torque(self, torque_Nm: float) -> None:
-        """Load the table from now on."""
-        ...
-
     def set_time_scale(self, time_scale: float) -> None:
         """Run at another rate from now on."""
-        ...
-
-    def reset(self) -> None:
-        """Cut the table's power and switch it on again."""
-        ...
-
-    def preset(self, count: int) -> None:
-        """Cut the table's power and switch it on again, with its counter at `count`."""
-        ...
-
-    def inject(self, fault: Fault) -> None:
-        """Let something go wrong, now or when the fault says."""
-        ...
-
-    def clear_faults(self) -> None:
-        """End all faults."""
         ...
 
     def quit(self) -> None:
@@ -70,9 +51,9 @@ class Command(NamedTuple):
 def _fault_command(kind: str) -> Command:
     """Return the command that injects a fault of this kind."""
     return Command(
-        f"fault: {KINDS[kind].help}",
+        f"fault: {help_of(kind)}",
         parameters_of(kind),
-        lambda stand, given: stand.inject(fault_from(kind, given)),
+        lambda stand, given: stand.table.inject(fault_from(kind, given)),
     )
 
 
@@ -81,7 +62,10 @@ COMMANDS: Mapping[str, Command] = {
     "state": Command(
         "show the table from inside: positions, speeds, motor, queues",
         (),
-        lambda stand, _: {**stand.status()._asdict(), "time_scale": stand.time_scale},
+        lambda stand, _: {**stand.table.status()._asdict(), "time_scale": stand.time_scale},
+    ),
+    "facts": Command(
+        "show the table's constants that its clients may rely on", (), lambda stand, _: stand.table.facts._asdict()
     ),
     "load-torque": Command(
         "load the table with a constant torque",
@@ -90,20 +74,22 @@ COMMANDS: Mapping[str, Command] = {
                 "torque_Nm", -1000.0, 1000.0, "torque at the table's axis in Nm; positive resists forward rotation"
             ),
         ),
-        lambda stand, given: stand.set_load_torque(given["torque_Nm"]),
+        lambda stand, given: stand.table.set_load_torque(given["torque_Nm"]),
     ),
     "time-scale": Command(
         "run faster or slower than real time",
         (TIME_SCALE,),
         lambda stand, given: stand.set_time_scale(given["time_scale"]),
     ),
-    "reset": Command("cut the table's power and switch it on again", (), lambda stand, _: stand.reset()),
+    "reset": Command("cut the table's power and switch it on again", (), lambda stand, _: stand.table.reset()),
     "preset": Command(
         "reset the table, and let its counter begin elsewhere than at 0",
         (Parameter("count", -(2**31), 2**31 - 1, "where the counter begins", whole=True),),
-        lambda stand, given: stand.preset(int(given["count"])),
+        lambda stand, given: stand.table.reset(int(given["count"])),
     ),
-    "clear-faults": Command("end all faults, and forget those to come", (), lambda stand, _: stand.clear_faults()),
+    "clear-faults": Command(
+        "end all faults, and forget those to come", (), lambda stand, _: stand.table.clear_faults()
+    ),
     "quit": Command("end the stand-in as SIGTERM does", (), lambda stand, _: stand.quit()),
 } | {f"fault-{kind}": _fault_command(kind) for kind in KINDS}
 """Every verb, in one place: the server runs them, the command-line client shows them."""
@@ -124,7 +110,7 @@ def answer(request: bytes, stand: Stand) -> bytes:
 
 
 def _parse(request: bytes) -> tuple[Command, dict[str, float]]:
-    fields = parsed_line(request)
+    fields = _parsed_line(request)
     if not isinstance(fields, dict) or not isinstance(name := fields.pop("command", None), str):
         raise RequestError('a request is a JSON object that names its command, such as {"command": "state"}')
     if name not in COMMANDS:
@@ -143,7 +129,7 @@ def _parse(request: bytes) -> tuple[Command, dict[str, float]]:
     }
 
 
-def parsed_line(line: bytes) -> Any:  # noqa: ANN401  # whatever JSON holds
+def _parsed_line(line: bytes) -> Any:  # noqa: ANN401  # whatever JSON holds
     """Return the value of a line of JSON.
 
     Raises:

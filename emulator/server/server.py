@@ -9,12 +9,10 @@ from collections.abc import Callable, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING
 
-from emulator.faults.fault import Fault
 from emulator.ports.port import Arrival, Port, spoiled
 from emulator.ports.readiness import wait_for
 from emulator.server.clock import Clock
 from emulator.server.signals import SignalWatch
-from emulator.table.status import TableStatus
 from emulator.table.table import Table
 
 if TYPE_CHECKING:
@@ -41,6 +39,9 @@ SERVED_SIGNALS = (*_END_SIGNALS, _TRIGGER_SIGNAL)
 class Server:
     """Serves a table in real time, on any number of ports that are all the same wire.
 
+    Attributes:
+        table: the table, level with the clock whenever the control channel acts on it.
+
     Args:
         table: the table; nobody else touches it while the server runs.
         clock: counts the ticks that are due; at 0 when the table was switched on.
@@ -59,7 +60,7 @@ class Server:
         control: "ControlSocket | None",
         warn: Callable[[str], None],
     ) -> None:
-        self._table = table
+        self.table = table
         self._clock = clock
         self._ports = ports
         self._signals = signals
@@ -78,7 +79,7 @@ class Server:
             readable, writable = self._wait()
             self._catch_up()
             self._let_go()
-            if self._table.hung_up is not self._hung_up:
+            if self.table.hung_up is not self._hung_up:
                 self._follow_hang_up()
             for port in self._ports:
                 if not writable.isdisjoint(port.output_descriptors):
@@ -99,43 +100,19 @@ class Server:
 
     def trigger(self) -> None:
         """Latch the encoder at this instant."""
-        fraction = self._clock.now_ticks() - self._table.tick
+        fraction = self._clock.now_ticks() - self.table.tick
         if fraction <= 0.0:  # another edge in the tick that the one before it has brought to its end
-            self._table.trigger()
+            self.table.trigger()
             return
-        self._table.trigger(min(fraction, _LAST_FRACTION))
+        self.table.trigger(min(fraction, _LAST_FRACTION))
         # The tick that the edge is in must be over before a client can ask for the latch.
-        self._table.advance(1)
+        self.table.advance(1)
         self._send_replies()
-
-    def status(self) -> TableStatus:
-        """Return the table as it is at this instant."""
-        return self._table.status()
-
-    def set_load_torque(self, torque_Nm: float) -> None:
-        """Load the table from now on."""
-        self._table.set_load_torque(torque_Nm)
 
     def set_time_scale(self, time_scale: float) -> None:
         """Run at another rate from now on."""
         self._clock.set_time_scale(time_scale)
         self._said_slow = False
-
-    def reset(self) -> None:
-        """Cut the table's power and switch it on again."""
-        self._table.reset()
-
-    def preset(self, count: int) -> None:
-        """Cut the table's power and switch it on again, with its counter at `count`."""
-        self._table.reset(count)
-
-    def inject(self, fault: Fault) -> None:
-        """Let something go wrong, now or when the fault says."""
-        self._table.inject(fault)
-
-    def clear_faults(self) -> None:
-        """End all faults."""
-        self._table.clear_faults()
 
     def quit(self) -> None:
         """End `run` when the present events are served."""
@@ -153,32 +130,32 @@ class Server:
 
     def _line_is_full(self) -> bool:
         """Return whether clients must wait, as behind any slow line."""
-        if self._table.ticks_until_byte() is None:
+        if self.table.ticks_until_byte() is None:
             return False
-        waiting = self._table.status().received_queue + sum(len(arrival.data) for arrival in self._arrivals)
+        waiting = self.table.status().received_queue + sum(len(arrival.data) for arrival in self._arrivals)
         return waiting >= _LINE_BUFFER_BYTES or len(self._arrivals) >= _MOST_ARRIVALS
 
     def _sleep_s(self) -> float:
-        ticks = self._table.ticks_until_byte()
+        ticks = self.table.ticks_until_byte()
         if ticks is None:
             return _LONGEST_SLEEP_S
-        return min(_LONGEST_SLEEP_S, self._clock.wall_s_until(self._table.tick + ticks))
+        return min(_LONGEST_SLEEP_S, self._clock.wall_s_until(self.table.tick + ticks))
 
     def _catch_up(self) -> None:
         """Bring the table level with the clock, or the clock with the table when that is too far ahead."""
         end_s = self._clock.wall_s() + _CATCH_UP_S
-        while (behind := int(self._clock.now_ticks()) - self._table.tick) > 0:
+        while (behind := int(self._clock.now_ticks()) - self.table.tick) > 0:
             if behind > _GIVE_UP_S * self._clock.ticks_per_wall_s:
                 self._hold_the_clock_back(behind)
                 return
             if self._clock.wall_s() > end_s:
                 return
-            self._table.advance(min(behind, _CATCH_UP_TICKS))
+            self.table.advance(min(behind, _CATCH_UP_TICKS))
             self._send_replies()
 
     def _hold_the_clock_back(self, behind: int) -> None:
         """Leave out the time for which the process was stopped, or the machine too slow."""
-        self._clock.set_ticks(self._table.tick)
+        self._clock.set_ticks(self.table.tick)
         if not self._said_slow:
             self._warn(
                 f"simulated time falls behind, by {behind / self._clock.ticks_per_wall_s:.1f} s of the clock, which "
@@ -189,7 +166,7 @@ class Server:
 
     def _follow_hang_up(self) -> None:
         """Take the ports away, or bring them back, as a fault of the table says."""
-        self._hung_up = self._table.hung_up
+        self._hung_up = self.table.hung_up
         for port in self._ports:
             if self._hung_up:
                 port.hang_up()
@@ -201,9 +178,9 @@ class Server:
         while self._arrivals and not self._leaving:
             arrival = self._arrivals.popleft()
             if arrival.left_before:
-                self._table.disconnect()
+                self.table.disconnect()
             if arrival.data:
-                self._table.receive(spoiled(arrival.data) if arrival.is_doubtful else arrival.data)
+                self.table.receive(spoiled(arrival.data) if arrival.is_doubtful else arrival.data)
                 self._send_replies()
             if arrival.left_after:
                 self._leaving = True
@@ -217,12 +194,12 @@ class Server:
 
     def _let_go(self) -> None:
         """Forget a client that has left, once the table has all that it sent: nothing of it may meet the next one."""
-        if self._leaving and self._table.ticks_until_byte() is None:
-            self._table.disconnect()
+        if self._leaving and self.table.ticks_until_byte() is None:
+            self.table.disconnect()
             self._leaving = False
 
     def _send_replies(self) -> None:
-        data = self._table.transmit()
+        data = self.table.transmit()
         if data and not self._leaving:
             for port in self._ports:
                 port.send(data)

@@ -2,6 +2,16 @@
 
 import math
 
+from emulator.faults.fault import (
+    DeadEncoder,
+    ExtraLoad,
+    LostCounts,
+    OneSided,
+    Stall,
+    StuckPwm,
+    SupplySag,
+    SwappedEncoder,
+)
 from emulator.faults.schedule import FaultSchedule
 from emulator.firmware.controller import step as firmware_step
 from emulator.int32 import wrap_int32
@@ -10,9 +20,10 @@ from emulator.plant.drive_train import step as drive_step
 from emulator.plant.encoder import count_at
 from emulator.plant.friction import Friction
 from emulator.table.tick import TableConstants, TableState
+from protocol.bench import Fault
 
-_KINDS = frozenset(
-    ("stall", "extra-load", "supply-sag", "stuck-pwm", "one-sided", "lost-counts", "swapped-encoder", "dead-encoder")
+_KINDS: frozenset[type[Fault]] = frozenset(
+    (Stall, ExtraLoad, SupplySag, StuckPwm, OneSided, LostCounts, SwappedEncoder, DeadEncoder)
 )
 _HELD_OVER_STALL = 4.0
 """What holds a stalled table, over the motor's own stall torque."""
@@ -42,15 +53,15 @@ def _drive_step(
     faults: FaultSchedule, constants: TableConstants, state: TableState, load_torque_Nm: float, supply_V: float
 ) -> DriveState:
     duty, supply_share, train = state.duty, 1.0, constants.drive
-    if fault := faults.holding("stuck-pwm"):
-        duty = round(fault.value("duty") * constants.firmware.pid.duty_max)
-    if (fault := faults.holding("one-sided")) and duty * fault.value("direction") <= 0:
+    if stuck := faults.holding(StuckPwm):
+        duty = round(stuck.duty * constants.firmware.pid.duty_max)
+    if (one_sided := faults.holding(OneSided)) and duty * one_sided.direction <= 0:
         duty = 0
-    if fault := faults.holding("supply-sag"):
-        supply_share = fault.value("supply_V") / supply_V
-    if fault := faults.holding("extra-load"):
-        load_torque_Nm += fault.value("torque_Nm")
-    if faults.holding("stall"):
+    if sag := faults.holding(SupplySag):
+        supply_share = sag.supply_V / supply_V
+    if load := faults.holding(ExtraLoad):
+        load_torque_Nm += load.torque_Nm
+    if faults.holding(Stall):
         holding_Nm = _HELD_OVER_STALL * train.torque_constant_Nm_A * supply_V / train.resistance_ohm
         train = train._replace(friction=Friction(holding_Nm, holding_Nm, train.friction.stribeck_s_rad))
     return drive_step(train, state.drive, duty * supply_share * constants.volts_per_duty, load_torque_Nm)
@@ -58,9 +69,9 @@ def _drive_step(
 
 def _counted(faults: FaultSchedule, turned: int) -> int:
     """Return how many counts the counter moves by when the shaft has turned by so many."""
-    if faults.holding("dead-encoder"):
+    if faults.holding(DeadEncoder):
         return 0
-    if fault := faults.holding("lost-counts"):
-        seen = sum(not faults.strikes(fault.value("probability")) for _ in range(abs(turned)))
+    if lost := faults.holding(LostCounts):
+        seen = sum(not faults.strikes(lost.probability) for _ in range(abs(turned)))
         turned = int(math.copysign(seen, turned))
-    return -turned if faults.holding("swapped-encoder") else turned
+    return -turned if faults.holding(SwappedEncoder) else turned

@@ -4,7 +4,7 @@ With a baud rate each byte takes its time on the line, both ways. At 0 there is 
 answered in the call that brings it.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterator
 
 from emulator.config.table_config import TableConfig
 from emulator.faults.line_faults import TO_CLIENT, TO_TABLE, LineFaults
@@ -16,8 +16,8 @@ from protocol.messages import LINE_LIMIT, ErrorCode
 _LONGEST_REPLY = LINE_LIMIT + 1
 _LINE_END = 0x0D
 
-Answer = Callable[[bytes | ErrorCode], bytes]
-"""The firmware: carries out a line, as `LineBuffer` gives it, and returns the reply."""
+Lines = Iterator[bytes | ErrorCode]
+"""What the firmware has read, as `LineBuffer` gives it. The reply to each is written before the next one is taken."""
 
 
 class SerialEnd:
@@ -36,21 +36,21 @@ class SerialEnd:
         self._sent = b""
         self._heard = self._said = b""  # since it was last overheard
 
-    def receive(self, data: bytes, tick: int, answer: Answer) -> None:
-        """Take bytes that the client puts on the line now."""
+    def receive(self, data: bytes) -> Lines:
+        """Take bytes that the client puts on the line now; yield what the firmware has read with this."""
         data = self._faults.on_the_line(data, TO_TABLE)
         if self._paced:
             self.uart.receive(data)
         else:
-            self._read(data, tick, answer)
+            yield from self._read(data)
 
     def transmit(self) -> bytes:
         """Return the bytes that have left by now, and forget them."""
         sent, self._sent = self._sent, b""
         return sent
 
-    def advance(self, tick: int, answer: Answer) -> None:
-        """Let a tick pass on the line; the firmware reads as long as it has room for a reply."""
+    def advance(self) -> Lines:
+        """Let a tick pass on the line; yield what the firmware reads, as long as it has room for a reply."""
         uart = self.uart
         uart.advance()
         while uart.readable and uart.transmit_room >= _LONGEST_REPLY:
@@ -58,7 +58,7 @@ class SerialEnd:
             if byte is LOST:
                 self._lines.spoil()
             else:
-                self._read(bytes((byte,)), tick, answer)
+                yield from self._read(bytes((byte,)))
         if sent := uart.transmit():
             self._send(sent)
 
@@ -74,18 +74,18 @@ class SerialEnd:
         """Return the ticks until the firmware has a whole line; None while none is on its way."""
         return self.uart.ticks_until_received(_LINE_END)
 
-    def pass_ticks(self, ticks: int, tick: int, answer: Answer) -> None:
-        """Let ticks pass, the last one up to `tick`, as so many calls of `advance` do.
+    def pass_ticks(self, ticks: int) -> Lines:
+        """Let ticks pass, as so many calls of `advance` do.
 
         The line does not need each of them, and no whole line comes before the last one.
         """
         if self.uart.idle:
             return
         if self.ticks_until_line() == ticks:
-            self._pass_quietly(ticks - 1, tick, answer)
-            self.advance(tick, answer)
+            yield from self._pass_quietly(ticks - 1)
+            yield from self.advance()
         else:
-            self._pass_quietly(ticks, tick, answer)
+            yield from self._pass_quietly(ticks)
 
     def ticks_until_sent(self, wanted: int, tick: int) -> int | None:
         """Return the ticks until `wanted` bytes may have left, or a line comes that may bring them; None if none does.
@@ -133,17 +133,15 @@ class SerialEnd:
         heard, said, self._heard, self._said = self._heard, self._said, b"", b""
         return heard, said
 
-    def _pass_quietly(self, ticks: int, tick: int, answer: Answer) -> None:
+    def _pass_quietly(self, ticks: int) -> Lines:
         if data := self.uart.advance_by(ticks):
-            self._read(data, tick, answer)
+            yield from self._read(data)
         if sent := self.uart.transmit():
             self._send(sent)
 
-    def _read(self, data: bytes, tick: int, answer: Answer) -> None:
+    def _read(self, data: bytes) -> Lines:
         self._heard += data
-        for line in self._lines.feed(data):
-            if reply := answer(line):
-                self.write(reply, tick)
+        yield from self._lines.feed(data)
 
     def _put(self, reply: bytes) -> None:
         if self._paced:

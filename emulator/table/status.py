@@ -1,7 +1,6 @@
-"""What can be seen of a table from outside the wire."""
+"""What can be seen of a table beside the wire, from its configuration and its state."""
 
 import math
-from typing import NamedTuple
 
 from emulator.config.table_config import TableConfig
 from emulator.firmware.controller import STATE_NAMES
@@ -10,29 +9,15 @@ from emulator.firmware.pid import RAMP
 from emulator.line.uart import Uart
 from emulator.plant.encoder import Encoder
 from emulator.table.tick import TableState
+from protocol.bench import TableFacts, TableStatus
 
 
-class TableStatus(NamedTuple):
-    """One look at a table. Angles are unwrapped; the true one is the table's own, behind the backlash."""
-
-    tick: int
-    reference_deg: float
-    encoder_deg: float
-    true_deg: float
-    reference_speed_deg_s: float
-    speed_deg_s: float  # as the firmware measures it
-    true_speed_deg_s: float
-    current_A: float
-    duty: float  # -1..1
-    gain_set: str  # "ramp" or "hold"
-    state: str  # "idle", "moving", "settling" or "stalled"
-    latched_deg: float
-    received_queue: int  # bytes that the firmware has not read
-    transmit_queue: int  # bytes that have not left
-    lost_bytes: int
-    load_torque_Nm: float
-    shaft_deg: float  # what an encoder without steps would read on the motor's shaft
-    gap_deg: float  # by how much the shaft is ahead of the table: half the backlash at most, either way
+def table_facts(config: TableConfig) -> TableFacts:
+    """Return the constants that clients may rely on."""
+    limits = config.limits
+    return TableFacts(
+        config.control.tick_hz, config.counts_per_turn / 360.0, limits.speed_deg_s, limits.acceleration_deg_s2
+    )
 
 
 def table_status(

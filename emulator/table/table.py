@@ -3,11 +3,10 @@
 import copy
 import math
 import random
-from collections.abc import Callable
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from emulator.config.table_config import TableConfig
-from emulator.faults.fault import Fault
 from emulator.faults.schedule import FaultSchedule
 from emulator.firmware.profiler import Profile
 from emulator.int32 import wrap_int32
@@ -17,14 +16,12 @@ from emulator.table.drive_faults import faulty_step, is_faulty
 from emulator.table.fast_ticks import Run
 from emulator.table.interpreter import Interpreter, Registers
 from emulator.table.serial_end import SerialEnd
-from emulator.table.status import TableStatus, table_status
+from emulator.table.status import table_facts, table_status
 from emulator.table.tick import TableConstants, TableState, run_undisturbed, step, table_constants, woken
 from emulator.table.trigger import TriggerInput
+from protocol.bench import Fault, Observer, TableStatus
 from protocol.codec import decode_command, encode_reply
 from protocol.messages import Command, ErrorCode, Refusal
-
-Observer = Callable[[TableStatus, bytes, bytes], None]
-"""Called after each tick with the status, and the bytes that the firmware has read and that have left."""
 
 
 class Snapshot(NamedTuple):
@@ -49,6 +46,7 @@ class Table:
 
     Attributes:
         config: the table's constants.
+        facts: those that its clients may rely on.
         tick: ticks since it was switched on.
         observer: who sees every tick, if anybody.
     """
@@ -64,6 +62,7 @@ class Table:
         chance = random.Random(seed)  # noqa: S311  # where a gear stands is no secret
         tick_hz = config.control.tick_hz
         self.config = config
+        self.facts = table_facts(config)
         self.tick = 0
         self.observer: Observer | None = None
         self._interpreter = Interpreter(config)
@@ -81,7 +80,7 @@ class Table:
 
     def receive(self, data: bytes) -> None:
         """Take bytes that the client puts on the line now."""
-        self._serial.receive(data, self.tick, self._answer)
+        self._carry_out(self._serial.receive(data))
         if self.observer is None:
             self._serial.overheard()  # and forgotten: nobody watches
 
@@ -241,7 +240,7 @@ class Table:
         ticks = end - self.tick
         self._owed_ticks += ticks
         self.tick = end
-        self._serial.pass_ticks(ticks, end, self._answer)
+        self._carry_out(self._serial.pass_ticks(ticks))
         self._serial.overheard()  # and forgotten: nobody watches
 
     @property
@@ -273,7 +272,7 @@ class Table:
             self._see_edge(angle_within_tick(before.angle_rad, end_rad, before.speed_rad_s, tick_s, fraction))
         self.tick += 1
         if not self._serial.uart.idle:
-            self._serial.advance(self.tick, self._answer)
+            self._carry_out(self._serial.advance())
         heard, said = self._serial.overheard()
         if self.observer is not None:
             self.observer(self.status(), heard, said)
@@ -299,6 +298,12 @@ class Table:
         if self._triggers.sees_edge(self.tick):
             latched_count = count_at(self._constants.encoder, angle_rad)
             self._registers = self._registers._replace(latched_count=latched_count)
+
+    def _carry_out(self, lines: Iterable[bytes | ErrorCode]) -> None:
+        """Answer lines that the firmware has read, each before the next one is read."""
+        for line in lines:
+            if reply := self._answer(line):
+                self._serial.write(reply, self.tick)
 
     def _answer(self, line: bytes | ErrorCode) -> bytes:
         """Carry out a line that the firmware has read, once the faults that wait for it have begun."""

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from planner.defaults import LAG_S, LEAD_S, RUN_ON_DEG
 from planner.errors import PlannerError
-from planner.execution.inside_view import InsideView
 from planner.execution.run_record import Record, Sent
 from planner.execution.stream import TimedCommand
 from planner.execution.stream_correction import CorrectedStream
@@ -20,6 +19,7 @@ from planner.table.motion import Limits
 from planner.table.velocity_profile import MotionCommand, ReferenceState, time_to_rest_s
 from planner.table.wire import Grid, Wire, command_line, exchanges_s
 from protocol import ArrivalTimeout, CommandRefused, TableClient, TableError, Verb
+from protocol.bench import InsideView
 from protocol.interrupts import signals_wait
 from protocol.progress import Progress
 

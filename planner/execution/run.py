@@ -1,7 +1,6 @@
 """A plan file carried out and verified, from the check before the first byte to the files that tell of it."""
 
 import time
-from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,7 +9,6 @@ import numpy as np
 from planner.defaults import RUN_ON_DEG, TOLERANCE_DEG
 from planner.execution.execute import Settings, bring_to, execute, resting_deg
 from planner.execution.free_way import check_ends, nearest_turns, turns_to_start
-from planner.execution.inside_view import ControlView, InsideView, view_of
 from planner.execution.robot_motion import robot_motion, turning_time_s
 from planner.execution.run_file import (
     PLAN_FILE,
@@ -26,11 +24,13 @@ from planner.execution.run_plots import plot_run
 from planner.execution.run_verification import RunVerification, verify_run
 from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_motion import PauseTimes, TableMotion
-from planner.execution.table_port import open_port
+from planner.execution.table_port import CONTROL_TIMEOUT_S, open_port
 from planner.map.map_file import MAP_FILE
 from planner.set_aside import set_aside
 from planner.table.wire import Wire
 from protocol import TableClient
+from protocol.bench import bench_of
+from protocol.control_channel import ControlChannel
 from protocol.progress import Progress
 
 
@@ -92,8 +92,9 @@ def run_plan(
     check_ends(run_input.problem.map, motion)
     check_it_fits(stream(motion, limits, wire, options.run_on_deg), wire)
     out.mkdir(parents=True, exist_ok=True)
-    with ExitStack() as stack:
-        table, view = _open(options, stack)
+    port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
+    with TableClient(port, options.timeout_s * options.time_scale, options.decimals) as table:
+        view = bench_of(port) if options.control is None else ControlChannel(options.control, CONTROL_TIMEOUT_S)
         table_began_s, wall_began_s = table.clock.now_s(), time.perf_counter()
         turns = _turns(run_input, motion, resting_deg(table, wire), options.arm_is_away)
         run_input = run_input.turned(turns)
@@ -130,17 +131,6 @@ def _with_time_for_the_arm(pause_times: PauseTimes, run_input: RunInput) -> Paus
     max_speeds_deg_s = np.array(run_input.document["arm"]["max_speed_deg_s"])
     needed_s = turning_time_s(run_input.plan, run_input.joints_deg, max_speeds_deg_s)
     return pause_times._replace(rotate_s=max(pause_times.rotate_s, needed_s))
-
-
-def _open(options: RunOptions, stack: ExitStack) -> tuple[TableClient, InsideView | None]:
-    """Return the table at the port, and a view into it where there is one; `stack` closes both."""
-    port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
-    table = stack.enter_context(TableClient(port, options.timeout_s * options.time_scale, options.decimals))
-    if options.control is None:
-        return table, view_of(port)
-    view = ControlView(options.control)
-    stack.callback(view.close)
-    return table, view
 
 
 def _turns(run_input: RunInput, motion: TableMotion, position_deg: float, arm_is_away: bool) -> int:

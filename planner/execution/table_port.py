@@ -8,6 +8,9 @@ from protocol.serial_port import open_serial_port
 # The stand-in's port `emulator://` is found by pyserial wherever the stand-in is installed; nothing of it is used here.
 _STAND_IN = "emulator"
 
+CONTROL_TIMEOUT_S = 1.0
+"""How long a control channel may take to answer while the table moves."""
+
 
 class ScaledClock:
     """The time of a stand-in that runs faster or slower than real."""

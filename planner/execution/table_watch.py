@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.execution.inside_view import InsideView
 from planner.execution.run_record import Observation, Record
 from planner.execution.table_motion import TableMotion
 from planner.table.wire import Wire
 from protocol import TableClient, TableError
+from protocol.bench import InsideView
 from protocol.progress import Progress
 
 # What the bytes of H, or of L, and of its answer come to.
@@ -160,7 +160,7 @@ class TableWatch:
     def _look(self, column: int | None = None) -> None:
         assert self._view is not None
         begin_s = self.now_s()
-        look = self._view.look()
+        look = self._view.status()
         end_s = self.now_s()
         self._next_look_s = end_s + self._look_s
         if column is not None or end_s - begin_s < _CERTAIN_S:

@@ -20,10 +20,9 @@ from planner.errors import PlannerError
 from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.execution.execute import Settings
 from planner.execution.free_way import check_ends
-from planner.execution.inside_view import ControlView
 from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_motion import TableMotion
-from planner.execution.table_port import open_port
+from planner.execution.table_port import CONTROL_TIMEOUT_S, open_port
 from planner.geometry.ray_casting import RayCaster
 from planner.map.config_map import ConfigurationMap
 from planner.planning.arm_check import PlannedArm, arm_fault
@@ -43,6 +42,8 @@ from planner.scanning.trigger_line import ProbeByHand, ProbeOnPort, TriggerLine
 from planner.table.motion import Limits
 from planner.table.wire import Wire
 from protocol import TableClient
+from protocol.bench import bench_of
+from protocol.control_channel import ControlChannel
 from protocol.progress import Progress, ProgressOf
 
 # Profiles that are measured at once: some 40 000 points.
@@ -169,10 +170,8 @@ def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) ->
     check_ends(planned.map, planned.motion)
     check_it_fits(stream(planned.motion, planned.limits, wire, options.run_on_deg), wire)
     port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
-    with ExitStack() as open_things:
-        timeout_s = options.timeout_s * options.time_scale
-        table = open_things.enter_context(TableClient(port, timeout_s, options.decimals))
-        line = _trigger_line(port, table, options, open_things)
+    with TableClient(port, options.timeout_s * options.time_scale, options.decimals) as table:
+        line = _trigger_line(port, table, options)
         settings = Settings(lag_s=options.lag_s, run_on_deg=options.run_on_deg)
         return run_latched(
             table,
@@ -187,8 +186,8 @@ def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) ->
         )
 
 
-def _trigger_line(port: object, table: TableClient, options: ScanOptions, open_things: ExitStack) -> TriggerLine:
-    simulated = getattr(port, "table", None)
+def _trigger_line(port: object, table: TableClient, options: ScanOptions) -> TriggerLine:
+    simulated = bench_of(port)
     conditions = options.triggers
     if simulated is not None:
         return ProbeOnPort(simulated, conditions.rate_hz, conditions.delay_s, conditions.faults, conditions.seed)
@@ -197,9 +196,7 @@ def _trigger_line(port: object, table: TableClient, options: ScanOptions, open_t
             f"{options.port}: the simulated probe has no line to trigger this table;"
             " use emulator://, or a stand-in with its --control channel"
         )
-    view = ControlView(options.control)
-    open_things.callback(view.close)
-    return ProbeByHand(view, table.clock)
+    return ProbeByHand(ControlChannel(options.control, CONTROL_TIMEOUT_S), table.clock)
 
 
 def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: ProgressOf) -> Scanned:

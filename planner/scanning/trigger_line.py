@@ -8,13 +8,13 @@ when the host has time for it.
 from array import array
 from collections.abc import Iterator
 from itertools import count
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from planner.arrays import FloatArray
-from planner.execution.inside_view import InsideView, Look, PortView
 from protocol import Clock
+from protocol.bench import InsideView, SimulatedBench, TableStatus
 
 
 class TriggerFaults(NamedTuple):
@@ -73,7 +73,7 @@ class ProbeOnPort:
 
     def __init__(
         self,
-        table: Any,  # noqa: ANN401 - the planner knows nothing of the stand-in's types
+        table: SimulatedBench,
         rate_hz: float,
         delay_s: float = 0.0,
         faults: TriggerFaults | None = None,
@@ -88,14 +88,14 @@ class ProbeOnPort:
             faults: What goes wrong on the way.
             seed: Chooses these times.
         """
-        self._table, self._view = table, PortView(table)
-        self._tick_hz = float(table.config.control.tick_hz)
+        self._table = table
+        self._tick_hz = float(table.facts.tick_hz)
         self._period_s, self._delay_s = 1.0 / rate_hz, delay_s
         self._faults = faults or TriggerFaults()
         self._rng = np.random.default_rng((seed, 5))
         self._start_s = self._end_s = float("inf")
         self._is_running = False
-        self._first_tick = int(table.tick)
+        self._first_tick = table.tick
         status = table.status()
         self._shaft_deg, self._gap_deg = array("d", [status.shaft_deg]), array("d", [status.gap_deg])
         self._edges_s: dict[int, float] = {}
@@ -105,9 +105,9 @@ class ProbeOnPort:
         self._next: tuple[float, int | None] = (np.inf, None)
         table.observer = self._after_tick
 
-    def look(self) -> Look:
+    def status(self) -> TableStatus:
         """Return where the table is at this moment."""
-        return self._view.look()
+        return self._table.status()
 
     def trigger(self) -> None:
         """Start to run, now; when it runs the probe fires by itself."""
@@ -155,7 +155,7 @@ class ProbeOnPort:
             if number in self._faults.table_doubles:
                 yield time_s + 0.5 * self._period_s, None
 
-    def _after_tick(self, status: Any, _heard: bytes, _said: bytes) -> None:  # noqa: ANN401 - as above
+    def _after_tick(self, status: TableStatus, _heard: bytes, _said: bytes) -> None:
         self._shaft_deg.append(status.shaft_deg)
         self._gap_deg.append(status.gap_deg)
         for number in self._arriving:
@@ -180,9 +180,9 @@ class ProbeByHand:
         self._view, self._clock = view, clock
         self._fired_s: list[float] = []
 
-    def look(self) -> Look:
+    def status(self) -> TableStatus:
         """Return where the table is at this moment."""
-        return self._view.look()
+        return self._view.status()
 
     def trigger(self) -> None:
         """Take a profile."""

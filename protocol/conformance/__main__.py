@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from protocol.bench import BenchError
 from protocol.conformance.bench.ports import SessionError, open_port
-from protocol.conformance.bench.stand import StandError
 from protocol.conformance.cases.case import Case
 from protocol.conformance.cases.catalogue import chosen_cases
 from protocol.conformance.commands.command_line import UsageError, say, tell
@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _list(cases)
         with ended_by_signals():
             return _on_the_table(options, cases)
-    except (UsageError, ProfileError, RecordError, SessionError, StandError, OSError) as error:
+    except (UsageError, ProfileError, RecordError, SessionError, BenchError, OSError) as error:
         say(str(error))
         return 2
     except KeyboardInterrupt as interrupt:

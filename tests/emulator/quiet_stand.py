@@ -1,42 +1,43 @@
 """A stand-in that stands still, for the control channel to act on."""
 
 from emulator.config.table_config import load_config
-from emulator.faults.fault import Fault
-from emulator.table.status import TableStatus
 from emulator.table.table import Table
+from protocol.bench import Fault
 
 
-class QuietStand:
+class WatchedTable(Table):
     """A table that stands still, with a list of what was done to it."""
 
     def __init__(self) -> None:
-        self.time_scale = 1.0
+        super().__init__(load_config())
         self.done: list[object] = []
-        self.table = Table(load_config())
-
-    def trigger(self) -> None:
-        self.done.append("trigger")
-
-    def status(self) -> TableStatus:
-        return self.table.status()
 
     def set_load_torque(self, torque_Nm: float) -> None:
         self.done.append(torque_Nm)
 
-    def set_time_scale(self, time_scale: float) -> None:
-        self.time_scale = time_scale
-
-    def reset(self) -> None:
-        self.done.append("reset")
-
-    def preset(self, count: int) -> None:
-        self.done.append(count)
+    def reset(self, count: int = 0) -> None:
+        self.done.append(f"reset {count}")
 
     def inject(self, fault: Fault) -> None:
-        self.done.append(fault.kind)
+        self.done.append(fault)
 
     def clear_faults(self) -> None:
         self.done.append("clear-faults")
+
+
+class QuietStand:
+    """The server of such a table."""
+
+    def __init__(self) -> None:
+        self.table = WatchedTable()
+        self.time_scale = 1.0
+        self.done = self.table.done
+
+    def trigger(self) -> None:
+        self.done.append("trigger")
+
+    def set_time_scale(self, time_scale: float) -> None:
+        self.time_scale = time_scale
 
     def quit(self) -> None:
         self.done.append("quit")

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from emulator.config.table_config import load_config
-from emulator.table.status import TableStatus
 from emulator.table.table import Table
+from protocol.bench import TableStatus
 
 PACED = load_config()
 UNPACED = PACED.with_serial(baud=0, decimals=6)

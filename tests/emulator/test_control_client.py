@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from emulator.control_client import ControlError, main, request
+from emulator.control_client import main, request
 from emulator.server.control_commands import COMMANDS
+from protocol.bench import BenchError
 from tests.emulator.quiet_stand import QuietStand
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Unix sockets")
@@ -20,7 +21,7 @@ def test_a_stand_in_that_takes_nobody_in_is_not_waited_for(folder: Path) -> None
         deaf.bind(str(folder / "control"))
         deaf.listen(0)
         waiting.connect(str(folder / "control"))
-        with pytest.raises(ControlError):
+        with pytest.raises(BenchError):
             request(folder / "control", "trigger")
 
 
@@ -37,7 +38,7 @@ def test_an_answer_of_something_else_is_said_to_be_none(folder: Path, reply: byt
         listener.listen()
         thread = threading.Thread(target=answer_once)
         thread.start()
-        with pytest.raises(ControlError, match="no answer of a stand-in"):
+        with pytest.raises(BenchError, match="no answer of a stand-in"):
             request(folder / "control", "trigger")
         thread.join()
 
@@ -60,7 +61,7 @@ def test_the_command_line_says_why_a_request_is_refused(served: Path, capsys: py
 def test_nobody_there_is_one_line_that_says_what_to_do(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(folder / "none"), "trigger"]) == 2
     assert "--control" in capsys.readouterr().err
-    with pytest.raises(ControlError):
+    with pytest.raises(BenchError):
         request(folder / "none", "trigger")
 
 

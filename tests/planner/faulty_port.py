@@ -1,9 +1,8 @@
 """A port onto a simulated table that goes wrong at a chosen moment."""
 
 from collections.abc import Callable
-from typing import Any, cast
 
-from planner.execution.table_port import open_port
+from emulator.protocol_emulator import Serial
 from protocol import Clock
 
 Fault = Callable[[bytes], bytes]
@@ -30,14 +29,14 @@ class FaultyPort:
     def __init__(
         self, fault: Fault | None = None, fault_s: float = 0.0, faults: int = 1_000_000, url: str = "emulator://"
     ) -> None:
-        self._port = cast("Any", open_port(url, 9600, 0.5))
+        self._port = Serial(url, baudrate=9600, timeout=0.5, write_timeout=0.5)
         self._fault, self._fault_s, self._faults = fault, fault_s, faults
-        self.table: Any = self._port.table
+        self.table = self._port.table
         self.clock: Clock = self._port.clock
 
     @property
     def timeout(self) -> float | None:
-        return float(self._port.timeout)
+        return self._port.timeout
 
     @timeout.setter
     def timeout(self, timeout_s: float | None) -> None:
@@ -45,17 +44,17 @@ class FaultyPort:
 
     @property
     def in_waiting(self) -> int:
-        return int(self._port.in_waiting)
+        return self._port.in_waiting
 
     def read(self, size: int, /) -> bytes:
-        data = bytes(self._port.read(size))
+        data = self._port.read(size)
         if self._fault is None or not data or self.clock.now_s() < self._fault_s or not self._faults:
             return data
         self._faults -= 1
         return self._fault(data)
 
     def write(self, data: bytes, /) -> int:
-        return int(self._port.write(data))
+        return self._port.write(data)
 
     def close(self) -> None:
         self._port.close()

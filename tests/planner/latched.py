@@ -1,7 +1,5 @@
 """Runs with latches, for tests: made up ones, and real ones on a table in simulated time."""
 
-from typing import Any
-
 import numpy as np
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
@@ -14,6 +12,7 @@ from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
 from planner.table.wire import Wire
 from protocol import TableClient
+from protocol.bench import SimulatedBench, bench_of
 
 LIMITS = Limits(40.0, 100.0)
 
@@ -34,9 +33,11 @@ def joints_along(plan: Plan) -> FloatArray:
     return np.tile(times_s[:, np.newaxis], (1, 6))
 
 
-def table_behind(port: object) -> Any:  # noqa: ANN401 - the planner knows nothing of its type
+def table_behind(port: object) -> SimulatedBench:
     """Return the simulated table that a port carries."""
-    return port.table  # type: ignore[attr-defined] # only the port in simulated time has one
+    table = bench_of(port)
+    assert table is not None
+    return table
 
 
 def latched_run(

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -11,6 +10,7 @@ from hypothesis import strategies as st
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from emulator.faults.fault import fault_from
 from protocol import NotStopped, PortError, TableClient
+from protocol.bench import SimulatedBench, bench_of
 
 FASTEST, HARDEST = 40.0, 100.0
 
@@ -37,7 +37,7 @@ class Stopped:
         return self.rest_s - abs(self.speed_deg_s) / self.rate_deg_s2
 
 
-def stopped(client: TableClient, table: Any, rate_deg_s2: float = HARDEST) -> Stopped:  # noqa: ANN401 - a port's table
+def stopped(client: TableClient, table: SimulatedBench, rate_deg_s2: float = HARDEST) -> Stopped:
     """Stop a table, and return what its reference did."""
     before = table.status()
     seen = [before]
@@ -60,16 +60,22 @@ def check(one: Stopped) -> None:
     assert one.position_deg == pytest.approx(one.end_deg, abs=0.1)
 
 
+def table_behind(client: TableClient) -> SimulatedBench:
+    table = bench_of(client.port)
+    assert table is not None
+    return table
+
+
 def table_at_rest(
     url: str = "emulator://", decimals: int = 1, rate: float = HARDEST, baud: int = 9600
-) -> tuple[TableClient, Any]:
+) -> tuple[TableClient, SimulatedBench]:
     """Return a table that rests, and has accepted its greatest S and A."""
     client = TableClient.open(url, baud or 9600, decimals=decimals)
     client.set_speed(FASTEST)
     client.set_acceleration(rate)
     client.move_to(0)
     client.wait_until_at(0)
-    return client, client.port.table  # type: ignore[attr-defined]  # the simulated one
+    return client, table_behind(client)
 
 
 @pytest.mark.parametrize("acceleration", [0.1, 1.0, 5.0, 20.0, 100.0])
@@ -157,7 +163,7 @@ def test_a_table_that_refuses_the_acceleration_asked_for_is_stopped_with_less(tm
     client.set_speed(FASTEST)
     client.move_to(1000)
     client.clock.sleep_s(4.0)
-    one = stopped(client, client.port.table, 25.0)  # type: ignore[attr-defined]
+    one = stopped(client, table_behind(client), 25.0)
     assert one.beyond_deg <= 1.0
     assert one.back_deg <= 1.0
 

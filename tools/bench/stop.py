@@ -7,18 +7,17 @@ waited for) table and client are copied, and the copies are stopped, as Ctrl-C a
 import copy
 import re
 from collections.abc import Callable
-from typing import Any, NamedTuple, TextIO, cast
+from typing import NamedTuple, TextIO
 
-import serial
-
-import emulator  # noqa: F401 - teaches pyserial the port emulator://
-from emulator.faults.fault import fault_from
+from emulator.faults.fault import HangUp
+from emulator.protocol_emulator import Serial
 from planner.defaults import shipped_scans
 from planner.execution.execute import bring_to, execute
 from planner.execution.run_input import RunInput
 from planner.execution.table_motion import TableMotion
 from planner.table.wire import Wire
-from protocol import Clock, NotStopped, Port, TableClient
+from protocol import Clock, NotStopped, TableClient
+from protocol.bench import SimulatedBench, bench_of
 from tools.bench.timing import print_table
 from tools.bench.virtual_run import shipped_run_input
 
@@ -64,23 +63,23 @@ class MomentsPort:
     """A port onto a simulated table that calls `at_moment` before every so many uses. A copy has its own table."""
 
     def __init__(self, url: str, every: int, at_moment: Callable[[], None]) -> None:
-        self._inner = cast("Any", serial.serial_for_url(url, timeout=0.5))
+        self._inner = Serial(url, timeout=0.5)
         self._every, self._at_moment, self._uses = every, at_moment, 0
 
     @property
-    def table(self) -> Any:  # noqa: ANN401 - of the emulator, as its port carries it
+    def table(self) -> SimulatedBench:
         """The simulated table."""
         return self._inner.table
 
     @property
     def clock(self) -> Clock:
         """The table's time."""
-        return cast("Clock", self._inner.clock)
+        return self._inner.clock
 
     @property
     def timeout(self) -> float | None:
         """How long `read` waits, in seconds."""
-        return cast("float | None", self._inner.timeout)
+        return self._inner.timeout
 
     @timeout.setter
     def timeout(self, timeout_s: float | None) -> None:
@@ -89,17 +88,17 @@ class MomentsPort:
     @property
     def in_waiting(self) -> int:
         """The number of bytes that can be read at once."""
-        return int(self._inner.in_waiting)
+        return self._inner.in_waiting
 
     def read(self, size: int, /) -> bytes:
         """Return `size` bytes, or fewer when `timeout` has passed."""
         self._use()
-        return bytes(self._inner.read(size))
+        return self._inner.read(size)
 
     def write(self, data: bytes, /) -> int:
         """Send all of `data`."""
         self._use()
-        return int(self._inner.write(data))
+        return self._inner.write(data)
 
     def close(self) -> None:
         """Give the port back."""
@@ -123,7 +122,7 @@ def stops_along(run_input: RunInput, every: int = EVERY, url: str = "emulator://
         moments.append(Moment(stop_copy(table, limits.acceleration_deg_s2), cut_off_copy(table)))
 
     port = MomentsPort(url, every, at_moment)
-    with TableClient(cast("Port", port), timeout_s=0.5, decimals=wire.decimals) as table:
+    with TableClient(port, timeout_s=0.5, decimals=wire.decimals) as table:
         bring_to(table, motion.start_deg, limits, wire)
         moments.clear()  # of the way to the start
         record = execute(table, motion, limits, wire)
@@ -146,7 +145,7 @@ def stop_copy(client: TableClient, acceleration_deg_s2: float) -> Stopped:
     assert abs(position_deg - seen[-1].reference_deg) < _SAID_DEG, "it stands where it says"
     return Stopped(
         beyond_deg=max(ways_deg) - speed_deg_s**2 / (2.0 * acceleration_deg_s2),
-        beyond_s=(last - before.tick) / table.config.control.tick_hz - speed_deg_s / acceleration_deg_s2,
+        beyond_s=(last - before.tick) / table.facts.tick_hz - speed_deg_s / acceleration_deg_s2,
         back_deg=max(ways_deg) - ways_deg[-1],
         speed_deg_s=speed_deg_s,
         way_deg=max(ways_deg),
@@ -158,7 +157,7 @@ def cut_off_copy(client: TableClient) -> CutOff:
     client = copy.deepcopy(client)
     table = _table_of(client)
     before = table.status()
-    table.inject(fault_from("hang-up", {}))
+    table.inject(HangUp())
     try:
         client.stop()
     except NotStopped as error:
@@ -169,9 +168,7 @@ def cut_off_copy(client: TableClient) -> CutOff:
     found = _TOLD_DEG.search(told)
     told_deg = float(found[1]) if found else float("nan")
     way_deg = abs(after.reference_deg - before.reference_deg)
-    return CutOff(
-        way_deg, (after.tick - before.tick) / table.config.control.tick_hz, abs(told_deg - after.reference_deg)
-    )
+    return CutOff(way_deg, (after.tick - before.tick) / table.facts.tick_hz, abs(told_deg - after.reference_deg))
 
 
 def bench(stream: TextIO, every: int = EVERY) -> None:
@@ -200,5 +197,7 @@ def bench(stream: TextIO, every: int = EVERY) -> None:
     print_table(stream, "Stops and cut lines along the shipped plans, worst figures", header, rows)
 
 
-def _table_of(client: TableClient) -> Any:  # noqa: ANN401 - of the emulator, as its port carries it
-    return client.port.table  # type: ignore[attr-defined] # where a port onto a simulated table has it
+def _table_of(client: TableClient) -> SimulatedBench:
+    table = bench_of(client.port)
+    assert table is not None
+    return table

@@ -9,7 +9,6 @@ import numpy as np
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.cell.scan import load_scan
 from planner.execution.execute import Settings, bring_to, execute
-from planner.execution.inside_view import view_of
 from planner.execution.run_input import RunInput
 from planner.execution.run_record import Record
 from planner.execution.run_verification import RunVerification, verify_run
@@ -26,6 +25,7 @@ from planner.planning.problem import Problem
 from planner.table.motion import Limits
 from planner.table.wire import Wire
 from protocol import TableClient
+from protocol.bench import bench_of
 
 
 class VirtualRun(NamedTuple):
@@ -48,7 +48,7 @@ def run_in_virtual_time(
     port = open_port(url, wire.baud, timeout_s=0.5)
     with TableClient(port, timeout_s=0.5, decimals=wire.decimals) as table:
         bring_to(table, motion.start_deg, limits, wire)
-        record = execute(table, motion, limits, wire, settings, view_of(port))
+        record = execute(table, motion, limits, wire, settings, bench_of(port))
         simulated_s = table.clock.now_s()
     real_s = time.perf_counter() - begin_s
     return VirtualRun(record, verify_run(run_input, motion, record, settings.lead_s), simulated_s, real_s)

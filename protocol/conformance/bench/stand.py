@@ -4,18 +4,18 @@ Who stands behind the port decides which of these there are: a table in the same
 control channel of a stand-in, programs that the profile names, or nobody.
 """
 
-import json
 import shlex
-import socket
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from shutil import which
-from typing import Any, Protocol
+from typing import Protocol
 
+from protocol.bench import Bench, BenchError, SimulatedBench, TableFacts, bench_of
 from protocol.conformance.bench.program import failure_of
 from protocol.conformance.profile.profile import Profile
+from protocol.control_channel import ControlChannel
 from protocol.port import Port
 
 TRIGGER = "a trigger input that the rig can drive"
@@ -28,20 +28,20 @@ DISCONNECT = "a table that sees its client go"
 PACING = "a paced line"
 RANDOM_SEARCH = "the library hypothesis"
 
-_TIMEOUT_S = 5.0
 _PROGRAM_S = 60.0
 _TRIGGER_KEY = "rig.trigger_command"
 _POWER_CYCLE_KEY = "rig.power_cycle_command"
-
-
-class StandError(Exception):
-    """Something beside the wire did not work; the message says what."""
 
 
 class Stand(Protocol):
     """What the rig can do; calling what is not among the capabilities is an error of the case."""
 
     capabilities: frozenset[str]
+
+    @property
+    def facts(self) -> TableFacts | None:
+        """The table's constants, where it can be asked for them."""
+        ...
 
     def trigger(self) -> None:
         """Put one edge on the trigger input, now."""
@@ -68,56 +68,63 @@ class WireOnly:
     """Nobody stands beside the wire."""
 
     capabilities: frozenset[str] = frozenset()
+    facts: TableFacts | None = None
 
     def trigger(self) -> None:
         """Refuse."""
-        raise StandError("the rig has no way to trigger the table")
+        raise BenchError("the rig has no way to trigger the table")
 
     def power_cycle(self) -> None:
         """Refuse."""
-        raise StandError("the rig has no way to switch the table off")
+        raise BenchError("the rig has no way to switch the table off")
 
     def preset(self, count: int) -> None:
         """Refuse."""
-        raise StandError(f"the rig has no way to preset the counter to {count}")
+        raise BenchError(f"the rig has no way to preset the counter to {count}")
 
     def encoder_deg(self) -> float:
         """Refuse."""
-        raise StandError("the rig does not see the encoder")
+        raise BenchError("the rig does not see the encoder")
 
     def trigger_within(self, share: float) -> float:
         """Refuse."""
-        raise StandError(f"the rig cannot trigger the table at {share:g} of a tick")
+        raise BenchError(f"the rig cannot trigger the table at {share:g} of a tick")
 
 
-class InProcess:
-    """A simulated table behind a port of this process; it is used as what it offers, not as what it is."""
+class OnBench(WireOnly):
+    """A table with a bench, which does what it is told."""
 
-    capabilities = frozenset({TRIGGER, POWER_CYCLE, PRESET, OBSERVER})
+    capabilities = frozenset({TRIGGER, POWER_CYCLE, PRESET})
 
-    def __init__(self, table: Any) -> None:  # noqa: ANN401  # the package that makes it is none of ours
-        self._table = table
-
-    @property
-    def counts_per_deg(self) -> float:
-        """Counts of the table's own registers to the degree."""
-        return float(self._table.config.counts_per_deg)
+    def __init__(self, bench: Bench) -> None:
+        self.facts = bench.facts
+        self._bench = bench
 
     def trigger(self) -> None:
         """Put one edge on the trigger input, now."""
-        self._table.trigger()
+        self._bench.trigger()
 
     def power_cycle(self) -> None:
         """Switch the table off and on."""
-        self._table.reset()
+        self._bench.reset()
 
     def preset(self, count: int) -> None:
         """Switch the table off and on, with its counter at `count`."""
-        self._table.reset(count)
+        self._bench.reset(count)
+
+
+class InProcess(OnBench):
+    """A simulated table behind a port of this process, whose time stands while it is looked at."""
+
+    capabilities = OnBench.capabilities | {OBSERVER}
+
+    def __init__(self, table: SimulatedBench) -> None:
+        super().__init__(table)
+        self._table = table
 
     def encoder_deg(self) -> float:
         """Return the encoder's position now."""
-        return float(self._table.status().encoder_deg)
+        return self._table.status().encoder_deg
 
     def trigger_within(self, share: float) -> float:
         """Put an edge at a share (0..1) of the coming tick, and return the encoder's position at the edge."""
@@ -128,48 +135,11 @@ class InProcess:
         return before_deg + share * (self.encoder_deg() - before_deg)
 
 
-class ControlChannel(WireOnly):
-    """The control channel of a stand-in: a line of JSON each way on a Unix socket."""
-
-    capabilities = frozenset({TRIGGER, POWER_CYCLE, PRESET})
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._request("state")
-
-    def trigger(self) -> None:
-        """Put one edge on the trigger input, now."""
-        self._request("trigger")
-
-    def power_cycle(self) -> None:
-        """Switch the table off and on."""
-        self._request("reset")
-
-    def preset(self, count: int) -> None:
-        """Switch the table off and on, with its counter at `count`."""
-        self._request("preset", count=count)
-
-    def _request(self, command: str, **parameters: float) -> None:
-        request = json.dumps({"command": command, **parameters}).encode() + b"\n"
-        try:
-            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-                connection.settimeout(_TIMEOUT_S)
-                connection.connect(str(self._path))
-                connection.sendall(request)
-                with connection.makefile("rb") as lines:
-                    answer = json.loads(lines.readline() or b'{"ok": false, "error": "hung up"}')
-        except (OSError, ValueError, RecursionError) as error:
-            raise StandError(f"{self._path}: {error}; is this the --control socket of a running stand-in?") from error
-        if not isinstance(answer, dict) or answer.get("ok") is not True:
-            reason = answer.get("error") if isinstance(answer, dict) else "this is no answer of a stand-in"
-            raise StandError(f"{self._path}: {command}: {reason}")
-
-
 class Programs(WireOnly):
     """Programs of the test bench that the profile names; each has done its deed when it ends with status 0.
 
     Raises:
-        StandError: there is no such program here.
+        BenchError: there is no such program here.
     """
 
     def __init__(
@@ -185,7 +155,7 @@ class Programs(WireOnly):
         self.capabilities = frozenset(capability for capability, command in named.items() if command)
         for key, command in ((_TRIGGER_KEY, trigger_command), (_POWER_CYCLE_KEY, power_cycle_command)):
             if command and which(command[0]) is None:
-                raise StandError(f"{key}: there is no program {command[0]!r} here; give its path, or leave the key out")
+                raise BenchError(f"{key}: there is no program {command[0]!r} here; give its path, or leave the key out")
 
     def trigger(self) -> None:
         """Run the trigger's program."""
@@ -197,17 +167,17 @@ class Programs(WireOnly):
 
     def _run(self, key: str, command: Sequence[str]) -> None:
         if not command:
-            raise StandError(f"the profile has no {key}")
+            raise BenchError(f"the profile has no {key}")
         failure = failure_of(command, self._timeout_s)
         if failure:
-            raise StandError(f"the profile's {key}, `{shlex.join(command)}`, {failure}")
+            raise BenchError(f"the profile's {key}, `{shlex.join(command)}`, {failure}")
 
 
 class RecordedStand:
     """Another stand, whose deeds stand in the record of the wire."""
 
     def __init__(self, stand: Stand, note: Callable[[str], None]) -> None:
-        self.capabilities = stand.capabilities
+        self.capabilities, self.facts = stand.capabilities, stand.facts
         self._stand = stand
         self._note = note
 
@@ -240,11 +210,11 @@ def stand_beside(port: Port, control: Path | None, profile: Profile) -> Stand:
     """Return what can be done to the table at a port.
 
     Raises:
-        StandError: the control channel does not answer, or a program that the profile names is not there.
+        BenchError: the control channel does not answer, or a program that the profile names is not there.
     """
     if control is not None:
-        return ControlChannel(control)
-    table = getattr(port, "table", None)
+        return OnBench(ControlChannel(control))
+    table = bench_of(port)
     if table is not None:
         return InProcess(table)
     return Programs(profile.rig.trigger_command, profile.rig.power_cycle_command)
@@ -252,10 +222,9 @@ def stand_beside(port: Port, control: Path | None, profile: Profile) -> Stand:
 
 def profile_of_the_table(stand: Stand, profile: Profile) -> Profile:
     """Return the profile with what the rig can ask the table itself: how many counts its registers have to a degree."""
-    counts_per_deg: float | None = getattr(stand, "counts_per_deg", None)
-    if counts_per_deg is None:
+    if stand.facts is None:
         return profile
-    return replace(profile, table=replace(profile.table, counts_per_deg=counts_per_deg))
+    return replace(profile, table=replace(profile.table, counts_per_deg=stand.facts.counts_per_deg))
 
 
 def capabilities(stand: Stand, profile: Profile) -> frozenset[str]:

@@ -24,7 +24,7 @@ def run_replay(options: argparse.Namespace, profile: Profile, port: ReopenablePo
         RecordError: the file is no record.
         UsageError: it holds none of these cases, or it may not be sent to this table.
         SessionError: what is at the port cannot be tested, or stands elsewhere than where the record began.
-        StandError: what is beside it does not work.
+        BenchError: what is beside it does not work.
     """
     record = _wanted(read_record(options.replay), cases, options.replay)
     _check_reach(record.profile, profile, options.replay)

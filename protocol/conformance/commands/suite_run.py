@@ -33,7 +33,7 @@ def run_suite(options: argparse.Namespace, profile: Profile, port: ReopenablePor
     Raises:
         UsageError: the files cannot be put where they should go, or nobody agreed to the table's being moved.
         SessionError: what is at the port cannot be tested.
-        StandError: what is beside it does not work.
+        BenchError: what is beside it does not work.
     """
     junit = _junit_file(options)
     confirm(options.port, options.yes, profile, port)

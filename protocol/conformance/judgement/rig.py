@@ -6,8 +6,9 @@ from decimal import Decimal
 from math import ceil, sqrt
 from random import Random
 
+from protocol.bench import BenchError
 from protocol.conformance.bench.host_watch import Punctual, Watch
-from protocol.conformance.bench.stand import Stand, StandError
+from protocol.conformance.bench.stand import Stand
 from protocol.conformance.bench.wire import CR, Line, Wire
 from protocol.conformance.judgement.reference import Instant, MotionRecord, Reference, Sample
 from protocol.conformance.judgement.verdict import Measurement, NonconformityError, require
@@ -112,7 +113,7 @@ class Rig(WireChecks):
         before = self.read()
         try:
             self.stand.power_cycle()
-        except StandError:
+        except BenchError:
             with suppress(NonconformityError):  # what the switch did not do is the news
                 self.home_deg += round(self.read() - before)
             raise

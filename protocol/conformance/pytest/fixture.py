@@ -12,9 +12,10 @@ from typing import Self
 
 import pytest
 
+from protocol.bench import BenchError
 from protocol.client import TableClient
 from protocol.conformance.bench.ports import SessionError, open_port
-from protocol.conformance.bench.stand import POWER_CYCLE, TRIGGER, Stand, StandError, stand_beside
+from protocol.conformance.bench.stand import POWER_CYCLE, TRIGGER, Stand, stand_beside
 from protocol.conformance.bench.wire import ReopenablePort
 from protocol.conformance.profile.profile import Profile, ProfileError, load_profile
 from protocol.errors import TableError
@@ -92,7 +93,7 @@ class RotaryTable:
             if capability not in self._stand.capabilities:
                 pytest.skip(f"lacks {capability}")
             deed(self._stand)
-        except StandError as error:
+        except BenchError as error:
             pytest.fail(str(error), pytrace=False)
 
 

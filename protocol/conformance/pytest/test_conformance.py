@@ -6,9 +6,10 @@ from contextlib import ExitStack
 
 import pytest
 
+from protocol.bench import BenchError
 from protocol.conformance.bench.host_watch import watch_in
 from protocol.conformance.bench.ports import SessionError, is_simulated, open_port
-from protocol.conformance.bench.stand import StandError, stand_beside
+from protocol.conformance.bench.stand import stand_beside
 from protocol.conformance.bench.wire import RecordedPort
 from protocol.conformance.cases.case import Case
 from protocol.conformance.cases.catalogue import all_cases
@@ -38,7 +39,7 @@ def session(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactor
             stand = stand_beside(port, control, profile)
             watch = stack.enter_context(watch_in(simulated=is_simulated(port)))
             one = session_at(url, RecordedPort(port), profile, stand, watch=watch)
-        except (ProfileError, SessionError, StandError) as error:
+        except (ProfileError, SessionError, BenchError) as error:
             pytest.exit(str(error), returncode=2)
         stack.callback(one.end)
         yield one

@@ -6,17 +6,11 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from random import Random
 
+from protocol.bench import BenchError
 from protocol.client import TableClient
 from protocol.conformance.bench.host_watch import Punctual, Watch
 from protocol.conformance.bench.ports import SessionError
-from protocol.conformance.bench.stand import (
-    PRESET,
-    RecordedStand,
-    Stand,
-    StandError,
-    capabilities,
-    profile_of_the_table,
-)
+from protocol.conformance.bench.stand import PRESET, RecordedStand, Stand, capabilities, profile_of_the_table
 from protocol.conformance.bench.wire import Event, RecordedPort, Wire
 from protocol.conformance.cases.case import Case
 from protocol.conformance.judgement.reference import MotionRecord
@@ -204,7 +198,7 @@ class Session:
         except NonconformityError as error:
             self._after_failure(case, rig)
             return Verdict.FAIL, _shortened(str(error))
-        except StandError as error:
+        except BenchError as error:
             self._after_failure(case, rig)
             return Verdict.ERROR, str(error)
         except OSError as error:
@@ -245,7 +239,7 @@ class Session:
         if PRESET in case.needs:
             try:
                 self._stand.power_cycle()
-            except StandError:
+            except BenchError:
                 return
             self.home_deg = 0
         self.end()

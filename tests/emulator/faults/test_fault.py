@@ -3,7 +3,6 @@
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -11,6 +10,7 @@ from emulator.config.table_config import load_config
 from emulator.config.toml_section import ConfigError
 from emulator.faults.fault import KINDS, FaultError, fault_from, parameters_of
 from emulator.server.control_commands import COMMANDS
+from tests.emulator.quiet_stand import QuietStand
 
 EXAMPLE: dict[str, dict[str, float]] = {
     "drop": {"probability": 0.3},
@@ -46,10 +46,9 @@ def test_the_three_ways_take_the_same_names_and_numbers(kind: str, tmp_path: Pat
         "[[faults]]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in {"fault": kind, **numbers}.items())
     )
     (from_file,) = load_config(file).faults
-    got: list[Any] = []
-    stand: Any = type("Stand", (), {"inject": lambda _, fault: got.append(fault)})()
+    stand = QuietStand()
     COMMANDS[f"fault-{kind}"].run(stand, numbers)
-    assert got == [from_file] == [fault_from(kind, numbers)]
+    assert stand.done == [from_file] == [fault_from(kind, numbers)]
 
 
 @pytest.mark.parametrize(

@@ -16,13 +16,18 @@ def test_each_command_does_what_it_says(stand: QuietStand) -> None:
         assert json.loads(answer(json.dumps({"command": name}).encode(), stand)) == {"ok": True}
     answer(b'{"command": "load-torque", "torque_Nm": -0.25}', stand)
     answer(b'{"command": "time-scale", "time_scale": 10}', stand)
-    assert stand.done == ["trigger", "reset", "quit", -0.25]
+    assert stand.done == ["trigger", "reset 0", "quit", -0.25]
     assert stand.time_scale == 10.0
 
 
 def test_state_shows_all_that_the_table_shows(stand: QuietStand) -> None:
     reply = json.loads(answer(b'{"command": "state"}', stand))
-    assert reply == {"ok": True, "time_scale": 1.0, **stand.status()._asdict()}
+    assert reply == {"ok": True, "time_scale": 1.0, **stand.table.status()._asdict()}
+
+
+def test_facts_shows_what_clients_may_rely_on(stand: QuietStand) -> None:
+    facts = {"tick_hz": 1000, "counts_per_deg": 512.0, "max_speed_deg_s": 40.0, "max_acceleration_deg_s2": 100.0}
+    assert json.loads(answer(b'{"command": "facts"}', stand)) == {"ok": True, **facts}
 
 
 @pytest.mark.parametrize(

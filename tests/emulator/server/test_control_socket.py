@@ -93,7 +93,7 @@ def test_a_client_for_whom_the_system_has_no_descriptor_waits_and_the_others_are
             resource.setrlimit(resource.RLIMIT_NOFILE, (before, most))
         assert stand.done == ["trigger"]
         control.serve(stand)
-    assert stand.done == ["trigger", "reset"]
+    assert stand.done == ["trigger", "reset 0"]
 
 
 def test_clients_that_go_without_a_word_harm_nobody(served: Path) -> None:
@@ -124,7 +124,7 @@ def test_a_crowd_of_clients_is_turned_away_and_those_who_were_there_are_served(f
         latecomer.connect(str(control.path))
         latecomer.sendall(b'{"command": "reset"}\n')
         control.serve(stand)
-    assert stand.done == ["trigger", "reset"]
+    assert stand.done == ["trigger", "reset 0"]
 
 
 def test_a_listener_that_takes_nobody_in_is_neither_waited_for_nor_removed(folder: Path) -> None:

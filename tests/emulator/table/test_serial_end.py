@@ -5,7 +5,7 @@ import pytest
 from emulator.config.table_config import load_config
 from emulator.faults.fault import fault_from
 from emulator.faults.schedule import FaultSchedule
-from emulator.table.serial_end import SerialEnd
+from emulator.table.serial_end import Lines, SerialEnd
 from protocol.messages import ErrorCode
 
 TICK_HZ = 1000
@@ -20,19 +20,20 @@ class Echo:
         self.lines: list[bytes | ErrorCode] = []
         self.tick = 0
 
-    def answer(self, line: bytes | ErrorCode) -> bytes:
-        self.lines.append(line)
-        return b"bad\r" if isinstance(line, ErrorCode) else line + b"\r"
+    def answer(self, lines: Lines) -> None:
+        for line in lines:
+            self.lines.append(line)
+            self.end.write(b"bad\r" if isinstance(line, ErrorCode) else line + b"\r", self.tick)
 
     def receive(self, data: bytes) -> None:
-        self.end.receive(data, self.tick, self.answer)
+        self.answer(self.end.receive(data))
 
     def advance(self, ticks: int) -> bytes:
         """Let ticks pass and return what has left in them."""
         for _ in range(ticks):
             self.tick += 1
             self.end.release(self.tick)
-            self.end.advance(self.tick, self.answer)
+            self.answer(self.end.advance())
         return self.end.transmit()
 
 

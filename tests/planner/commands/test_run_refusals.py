@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from planner.__main__ import main
-from planner.execution.inside_view import ControlView, Look
 from planner.kinematics.configuration import Configuration
 from planner.kinematics.inverse_kinematics import inverse_kinematics
 from protocol import TableClient
+from protocol.control_channel import ControlChannel
 from tests.planner.run_examples import CELL, JOINTS_DEG, LOCATIONS, scan_locations, write_short_scan
 
 Document = dict[str, Any]
@@ -34,13 +34,10 @@ def stand_in(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Pa
             process.terminate()
 
 
-def state_of(control: Path) -> Look:
+def state_of(control: Path) -> tuple[float, float, float]:
     """Return where the table is, by its own state."""
-    view = ControlView(control)
-    try:
-        return view.look()
-    finally:
-        view.close()
+    status = ControlChannel(control).status()
+    return status.reference_deg, status.encoder_deg, status.true_deg
 
 
 def with_joints(joints_deg: np.ndarray[Any, np.dtype[np.float64]]) -> Change:

@@ -1,14 +1,13 @@
 """The line dies in mid-run: how far an emulated table runs on, and what the report says of it."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 
-from emulator.table.table import Table
+from emulator.table.table import Snapshot, Table
 from planner.defaults import shipped_scans
-from planner.execution.dead_line import judge_dead_line
+from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.execution.execute import Settings, bring_to, execute
 from planner.execution.run_on import latest_s
 from planner.execution.run_record import Record
@@ -36,7 +35,7 @@ def ways_after_a_cut(
     Each way is that of a copy of the table which hears nothing any more, until it stands.
     """
     port = FaultyPort()
-    snapshots: list[Any] = []
+    snapshots: list[Snapshot] = []
     seen = iter(range(1_000_000))
 
     def look(_: int, __: int) -> None:
@@ -49,7 +48,7 @@ def ways_after_a_cut(
     return record, [_way_deg(Table(port.table.config), each) for each in snapshots]
 
 
-def _way_deg(table: Table, snapshot: Any) -> float:  # noqa: ANN401 - the emulator's own type, passed on
+def _way_deg(table: Table, snapshot: Snapshot) -> float:
     table.restore(snapshot)
     begin_deg, way_deg = table.status().encoder_deg, 0.0
     while table.status().state == "moving":
@@ -105,7 +104,7 @@ def steady_motion() -> TableMotion:
     return TableMotion(Plan("", "", 0.5, angles, speeds, accelerations, PathCost(0.0, 0.0, 0.0)), Limits())
 
 
-def judged(configuration_map: ConfigurationMap) -> Any:  # noqa: ANN401 - the result of a run
+def judged(configuration_map: ConfigurationMap) -> DeadLine:
     motion = steady_motion()
     table = TableClient(FaultyPort(), timeout_s=0.5)
     record = execute(table, motion, Limits(), Wire())

@@ -8,7 +8,6 @@ import pytest
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.execution.execute import ExecutionError, Settings, bring_to, execute
-from planner.execution.inside_view import PortView
 from planner.execution.run_record import Record
 from planner.execution.table_motion import Phase, TableMotion
 from planner.execution.table_port import ScaledClock
@@ -38,12 +37,12 @@ def run(
 ) -> Record:
     table = TableClient(port, timeout_s=0.5)
     bring_to(table, motion.start_deg, LIMITS, WIRE)
-    return execute(table, motion, LIMITS, WIRE, settings, PortView(port.table), progress)
+    return execute(table, motion, LIMITS, WIRE, settings, port.table, progress)
 
 
 def stands(port: FaultyPort) -> bool:
     port.table.advance(8000)
-    return bool(port.table.status().state in {"idle", "stalled"})
+    return port.table.status().state in {"idle", "stalled"}
 
 
 def test_every_command_is_sent_in_time_and_every_trigger_is_latched() -> None:

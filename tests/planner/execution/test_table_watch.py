@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
-from planner.execution.inside_view import PortView
 from planner.execution.run_record import Record
 from planner.execution.table_watch import StrayedError, TableWatch
 from planner.planning.plan import Plan
@@ -29,7 +28,7 @@ def watch_on(
     """Return a watch whose latch is read `rate_hz` times a second, and its record."""
     table, motion = TableClient(port, timeout_s=0.5), ReadingMotion(standing_still(), Limits(), rate_hz)
     record = Record(origin_s=port.clock.now_s())
-    view = PortView(port.table) if with_view else None
+    view = port.table if with_view else None
     return TableWatch(table, motion, Wire(), record, tolerance_deg, poll_s=0.05, look_s=0.02, view=view), record
 
 

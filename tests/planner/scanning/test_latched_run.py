@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
-from planner.execution.inside_view import Look, PortView
 from planner.execution.table_port import open_port
 from planner.scanning.latched_run import LatchedRun, NothingScannedError, ReadingMotion, TriggerConditions, run_latched
 from planner.scanning.latching import Drop
 from planner.scanning.trigger_line import ProbeByHand, TriggerFaults
 from planner.table.wire import Wire
 from protocol import Clock, TableClient
+from protocol.bench import InsideView, TableStatus
 from tests.planner.latched import LIMITS, joints_along, latched_run, swinging_plan, table_behind
 
 
@@ -128,17 +128,17 @@ def test_profiles_are_taken_on_the_path_only(sound: LatchedRun) -> None:
     assert sound.times_s.max() <= 4.0
 
 
-class SlowView(PortView):
+class SlowView:
     """A view into a table through which the first look takes long."""
 
-    def __init__(self, table: object, clock: Clock, first_look_s: float) -> None:
-        super().__init__(table)
-        self._clock, self._delay_s = clock, first_look_s
+    def __init__(self, table: InsideView, clock: Clock, first_look_s: float) -> None:
+        self.trigger = table.trigger
+        self._table, self._clock, self._delay_s = table, clock, first_look_s
 
-    def look(self) -> Look:
+    def status(self) -> TableStatus:
         self._clock.sleep_s(self._delay_s)
         self._delay_s = 0.0
-        return super().look()
+        return self._table.status()
 
 
 def test_a_look_that_takes_long_does_not_shift_the_profiles_in_time() -> None:

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from emulator.table.table import Table
+from protocol.bench import BenchError
 from protocol.conformance.__main__ import main
-from protocol.conformance.bench.stand import POWER_CYCLE, TRIGGER, Programs, StandError, WireOnly
+from protocol.conformance.bench.stand import POWER_CYCLE, TRIGGER, Programs, WireOnly
 from protocol.conformance.bench.wire import RecordedPort
 from protocol.conformance.cases.catalogue import chosen_cases
 from protocol.conformance.judgement.verdict import Verdict
@@ -50,7 +51,7 @@ def test_what_has_a_program_can_be_done() -> None:
     ],
 )
 def test_a_program_that_fails_is_named_with_what_it_said(command: tuple[str, ...], sentence: str) -> None:
-    with pytest.raises(StandError) as caught:
+    with pytest.raises(BenchError) as caught:
         Programs(command, ()).trigger()
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -61,7 +62,7 @@ def test_a_program_that_does_not_end_is_ended_with_all_that_it_began(tmp_path: P
     os.mkfifo(fifo)
     alive = os.open(fifo, os.O_RDONLY | os.O_NONBLOCK)
     try:
-        with pytest.raises(StandError, match=r"rig.power_cycle_command, `sh -c .*`, did not end within 0.3 s"):
+        with pytest.raises(BenchError, match=r"rig.power_cycle_command, `sh -c .*`, did not end within 0.3 s"):
             Programs((), ("sh", "-c", f"sleep 600 >{fifo} & wait"), timeout_s=0.3).power_cycle()
         assert select.select([alive], [], [], 10)[0], "the sleep goes on"
         assert os.read(alive, 1) == b""
@@ -117,7 +118,7 @@ class SwitchesAndFails(WireOnly):
 
     def power_cycle(self) -> None:
         self._table.reset()
-        raise StandError("the switch did not come back")
+        raise BenchError("the switch did not come back")
 
 
 def test_a_power_switch_that_fails_when_it_is_done_makes_no_other_place_home() -> None:
