@@ -6,7 +6,7 @@ An emulated table in this process is a `SimulatedBench`. An emulator in another 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, Protocol, runtime_checkable
+from typing import Annotated, ClassVar, NamedTuple, Protocol, dataclass_transform, runtime_checkable
 
 from protocol.errors import TableError
 
@@ -47,21 +47,25 @@ class TableStatus(NamedTuple):
     gap_deg: float  # by how much the shaft is ahead of the table: half the backlash at most, either way
 
 
+@dataclass_transform(kw_only_default=True, frozen_default=True)
 @dataclass(frozen=True, kw_only=True)
 class Fault:
     """A fault that can be injected. Each kind is a subclass with its own numbers, in `emulator.faults`.
 
-    Attributes:
-        kind: its name, as a person types it.
-        at_s: when it begins, since the table was switched on; None: now.
-        at_command: the command with which it begins, counted from the first ever; None: now.
-        for_s: how long it lasts; None: until it is cleared.
+    The annotation of a number holds the closed interval that it must lie in, and its help.
     """
 
     kind: ClassVar[str]
-    at_s: float | None = None
-    at_command: int | None = None
-    for_s: float | None = None
+    at_s: Annotated[float | None, 0.0, 1e9, "begins at this time since the table was switched on (default: now)"] = None
+    at_command: Annotated[
+        int | None, 1, 1e9, "begins with this command, counted from the first ever (default: now)"
+    ] = None
+    for_s: Annotated[float | None, 0.001, 1e9, "lasts so long (default: until it is cleared)"] = None
+
+    def __init_subclass__(cls, kind: str) -> None:
+        """Make a kind of fault a frozen value with a name, by which a person calls it."""
+        cls.kind = kind
+        dataclass(frozen=True, kw_only=True)(cls)
 
     def numbers(self) -> dict[str, float]:
         """Return all its numbers by their names."""

@@ -5,7 +5,7 @@ holds is in `schedule`; what it does is in `line_faults`, `drive_faults` and `tr
 """
 
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, fields
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from emulator.faults.parameter import Parameter, brief
@@ -16,146 +16,109 @@ class FaultError(ValueError):
     """A fault that cannot be; the message says what is allowed."""
 
 
-# The annotation of a number holds the closed interval that it must lie in, and its help.
 ByteProbability = Annotated[float, 0.0, 1.0, "of each byte"]
 EdgeProbability = Annotated[float, 0.0, 1.0, "of each edge"]
 Delay = Annotated[float, 0.0, 3600.0, "by how long"]
 LineDirection = Annotated[int, -1, 1, "1: towards the table, -1: towards the client, 0 (default): both"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Drop(Fault):
+class Drop(Fault, kind="drop"):
     """Bytes are lost on the line."""
 
-    kind = "drop"
     probability: ByteProbability
     direction: LineDirection = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Flip(Fault):
+class Flip(Fault, kind="flip"):
     """A bit of a byte turns over on the line."""
 
-    kind = "flip"
     probability: ByteProbability
     direction: LineDirection = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class LateReplies(Fault):
+class LateReplies(Fault, kind="delay"):
     """All replies come later."""
 
-    kind = "delay"
     seconds: Delay
 
 
-@dataclass(frozen=True, kw_only=True)
-class HalfReply(Fault):
+class HalfReply(Fault, kind="half-reply"):
     """The next reply ends before its end."""
 
-    kind = "half-reply"
     bytes: Annotated[int, 0, 32, "that are sent of it"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class LateReply(Fault):
+class LateReply(Fault, kind="late-reply"):
     """The next reply comes late, and those after it behind it."""
 
-    kind = "late-reply"
     seconds: Delay
 
 
-class Silence(Fault):
+class Silence(Fault, kind="silence"):
     """The table carries out what it hears and says nothing."""
 
-    kind = "silence"
 
-
-class HangUp(Fault):
+class HangUp(Fault, kind="hang-up"):
     """The port goes away; it comes back when the fault ends."""
 
-    kind = "hang-up"
 
-
-@dataclass(frozen=True, kw_only=True)
-class WrongBaud(Fault):
+class WrongBaud(Fault, kind="wrong-baud"):
     """The table listens and talks at another rate."""
 
-    kind = "wrong-baud"
     baud: Annotated[int, 50, 4_000_000, "of it"]
 
 
-class Stall(Fault):
+class Stall(Fault, kind="stall"):
     """Something holds the table."""
 
-    kind = "stall"
 
-
-@dataclass(frozen=True, kw_only=True)
-class ExtraLoad(Fault):
+class ExtraLoad(Fault, kind="extra-load"):
     """A torque loads the table."""
 
-    kind = "extra-load"
     torque_Nm: Annotated[float, -1000.0, 1000.0, "at its axis; positive resists forward rotation"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class SupplySag(Fault):
+class SupplySag(Fault, kind="supply-sag"):
     """The motor's supply falls."""
 
-    kind = "supply-sag"
     supply_V: Annotated[float, 0.0, 100.0, "that is left"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class StuckPwm(Fault):
+class StuckPwm(Fault, kind="stuck-pwm"):
     """The bridge keeps one duty."""
 
-    kind = "stuck-pwm"
     duty: Annotated[float, -1.0, 1.0, "that it keeps"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class OneSided(Fault):
+class OneSided(Fault, kind="one-sided"):
     """The bridge drives in one direction only."""
 
-    kind = "one-sided"
     direction: Annotated[int, -1, 1, "1: forwards, -1: backwards, 0: neither"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class LostCounts(Fault):
+class LostCounts(Fault, kind="lost-counts"):
     """Encoder edges are not counted."""
 
-    kind = "lost-counts"
     probability: EdgeProbability
 
 
-class SwappedEncoder(Fault):
+class SwappedEncoder(Fault, kind="swapped-encoder"):
     """The encoder's A and B are swapped: it counts the wrong way."""
 
-    kind = "swapped-encoder"
 
-
-class DeadEncoder(Fault):
+class DeadEncoder(Fault, kind="dead-encoder"):
     """The encoder counts nothing."""
 
-    kind = "dead-encoder"
 
-
-@dataclass(frozen=True, kw_only=True)
-class MissedTrigger(Fault):
+class MissedTrigger(Fault, kind="missed-trigger"):
     """Trigger edges are not seen."""
 
-    kind = "missed-trigger"
     probability: EdgeProbability
 
 
-@dataclass(frozen=True, kw_only=True)
-class BouncedTrigger(Fault):
+class BouncedTrigger(Fault, kind="bounced-trigger"):
     """Each trigger edge is followed by others."""
 
-    kind = "bounced-trigger"
     edges: Annotated[int, 1, 100, "that follow"]
     within_s: Annotated[float, 0.001, 10.0, "after it, spread by chance"]
 
@@ -172,20 +135,6 @@ KINDS: Mapping[str, type[Fault]] = {
 }  # fmt: skip
 """Every fault by its name."""
 
-SCHEDULE: tuple[Parameter, ...] = (
-    Parameter("at_s", 0.0, 1e9, "begins at this time since the table was switched on (default: now)", optional=True),
-    Parameter(
-        "at_command",
-        1,
-        1e9,
-        "begins with this command, counted from the first ever (default: now)",
-        optional=True,
-        whole=True,
-    ),
-    Parameter("for_s", 0.001, 1e9, "lasts so long (default: until it is cleared)", optional=True),
-)
-"""What every fault takes besides its own numbers."""
-
 
 def help_of(kind: str) -> str:
     """Return what a fault does, as half a sentence."""
@@ -195,14 +144,17 @@ def help_of(kind: str) -> str:
 
 def parameters_of(kind: str) -> tuple[Parameter, ...]:
     """Return all that a fault takes: its own numbers, and its schedule; one that strikes once has no duration."""
+    own: list[Parameter] = []
+    schedule: list[Parameter] = []
     defaults = {each.name: each.default for each in fields(KINDS[kind])}
-    own = []
     for name, hint in get_type_hints(KINDS[kind], include_extras=True).items():
         if get_origin(hint) is Annotated:
             number, least, most, words = get_args(hint)
-            own.append(Parameter(name, least, most, words, defaults[name] is not MISSING, number is int))
-    once = issubclass(KINDS[kind], STRIKES_ONCE)
-    return (*own, *(parameter for parameter in SCHEDULE if not (once and parameter.name == "for_s")))
+            whole = int in (number, *get_args(number))
+            parameter = Parameter(name, least, most, words, defaults[name] is not MISSING, whole)
+            (schedule if name in Fault.__annotations__ else own).append(parameter)
+    strikes_once = issubclass(KINDS[kind], STRIKES_ONCE)
+    return (*own, *(parameter for parameter in schedule if not (strikes_once and parameter.name == "for_s")))
 
 
 def fault_from(kind: object, given: Mapping[str, object]) -> Fault:

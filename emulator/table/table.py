@@ -12,12 +12,13 @@ from emulator.firmware.profiler import Profile
 from emulator.int32 import wrap_int32
 from emulator.plant.drive_train import DriveState, at_standstill
 from emulator.plant.encoder import angle_within_tick, count_at, recounted
-from emulator.table.drive_faults import faulty_step, is_faulty
+from emulator.table.drive_faults import is_faulty
 from emulator.table.fast_ticks import Run
 from emulator.table.interpreter import Interpreter, Registers
+from emulator.table.machine import Machine
 from emulator.table.serial_end import SerialEnd
 from emulator.table.status import table_facts, table_status
-from emulator.table.tick import TableConstants, TableState, run_undisturbed, step, table_constants, woken
+from emulator.table.tick import TableConstants, TableState, table_constants, woken
 from emulator.table.trigger import TriggerInput
 from protocol.bench import Fault, Observer, TableStatus
 from protocol.codec import decode_command, encode_reply
@@ -67,13 +68,11 @@ class Table:
         self.observer: Observer | None = None
         self._interpreter = Interpreter(config)
         self._registers = self._interpreter.power_on()
-        self._constants = table_constants(config, encoder_phase=chance.random())
         self._run = run
-        self._owed_ticks = 0  # by which plant and controller are behind
-        self._resting = False  # the state repeats itself, so ticks cost nothing
-        self._state = self._woken(at_standstill(self._constants.drive, gap_share=chance.uniform(-1.0, 1.0)))
+        constants = table_constants(config, encoder_phase=chance.random())
+        drive = at_standstill(constants.drive, gap_share=chance.uniform(-1.0, 1.0))
+        self._machine = Machine(constants, self._woken(constants, drive), run=run)
         self._true_zero_rad = 0.0
-        self._load_torque_Nm = 0.0
         self._faults = FaultSchedule(config.faults, tick_hz, seed)
         self._serial = SerialEnd(config, self._faults)
         self._triggers = TriggerInput(tick_hz, self._faults)
@@ -105,7 +104,6 @@ class Table:
         """Let something go wrong, now or when the fault says."""
         if self._faults.inject(fault, self.tick):
             self.disconnect()
-        self._resting = False
 
     def clear_faults(self) -> None:
         """End all faults, and forget those to come; replies that are late are still to come."""
@@ -125,7 +123,7 @@ class Table:
         if not 0.0 <= fraction < 1.0:
             raise ValueError(f"an edge at {fraction} of a tick is outside 0..1")
         if fraction == 0.0:
-            self._see_edge(self._state.drive.angle_rad)
+            self._see_edge(self._machine.state.drive.angle_rad)
         else:
             self._triggers.add_edge(self.tick, fraction)
 
@@ -133,19 +131,17 @@ class Table:
         """Load the table with a torque that resists positive rotation, until it is set anew."""
         if not math.isfinite(torque_Nm):
             raise ValueError(f"a load torque of {torque_Nm} Nm is not finite")
-        self._pay()
-        self._load_torque_Nm = float(torque_Nm)
-        self._resting = False
+        self._machine.load_torque_Nm = float(torque_Nm)
 
     def reset(self, count: int = 0) -> None:
         """Switch the table off and on: the controller wakes at `count` where the plant is; the plant goes on."""
-        drive, encoder = self._state.drive, self._constants.encoder
-        self._constants = self._constants._replace(encoder=recounted(encoder, drive.angle_rad, count))
-        self._true_zero_rad = (drive.angle_rad - count / encoder.count_rad) * self._constants.drive.table_per_motor
+        machine, drive = self._machine, self._machine.state.drive
+        encoder = machine.constants.encoder
+        machine.constants = machine.constants._replace(encoder=recounted(encoder, drive.angle_rad, count))
+        self._true_zero_rad = (drive.angle_rad - count / encoder.count_rad) * machine.constants.drive.table_per_motor
         self.disconnect()
         self._registers = self._interpreter.power_on()._replace(latched_count=wrap_int32(count))
-        self._state = self._woken(drive)
-        self._resting = False
+        machine.state = self._woken(machine.constants, drive)
 
     @property
     def received_queue(self) -> int:
@@ -165,12 +161,12 @@ class Table:
         """Return what can be seen of the table now."""
         return table_status(
             self.config,
-            self._state,
+            self._machine.state,
             self._serial.uart,
-            encoder=self._constants.encoder,
+            encoder=self._machine.constants.encoder,
             tick=self.tick,
             latched_count=self._registers.latched_count,
-            load_torque_Nm=self._load_torque_Nm,
+            load_torque_Nm=self._machine.load_torque_Nm,
             true_zero_rad=self._true_zero_rad,
         )
 
@@ -179,32 +175,31 @@ class Table:
         return copy.deepcopy(
             Snapshot(
                 self.tick,
-                self._constants,
-                self._state,
+                self._machine.constants,
+                self._machine.state,
                 self._registers,
                 self._serial,
                 self._triggers,
                 self._faults,
-                self._load_torque_Nm,
+                self._machine.load_torque_Nm,
                 self._true_zero_rad,
             )
         )
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of a table with this configuration."""
-        self._owed_ticks = 0
         (
             self.tick,
-            self._constants,
-            self._state,
+            constants,
+            state,
             self._registers,
             self._serial,
             self._triggers,
             self._faults,
-            self._load_torque_Nm,
+            load_torque_Nm,
             self._true_zero_rad,
         ) = copy.deepcopy(snapshot)
-        self._resting = False
+        self._machine = Machine(constants, state, load_torque_Nm, self._run)
 
     def advance(self, ticks: int) -> None:
         """Let simulated time pass."""
@@ -219,7 +214,7 @@ class Table:
                 self._advance_undisturbed(event)
         self._serve_faults()
         if self._run is None:
-            self._pay()
+            self._machine.catch_up()
 
     def _is_busy(self) -> bool:
         """Return whether each tick needs a look: at the line, by the observer, or for a drive that is not sound."""
@@ -238,37 +233,18 @@ class Table:
     def _advance_undisturbed(self, end: int) -> None:
         """Pass ticks in which nothing comes from outside; a state that repeats itself stays to the end."""
         ticks = end - self.tick
-        self._owed_ticks += ticks
+        self._machine.pass_ticks(ticks)
         self.tick = end
         self._carry_out(self._serial.pass_ticks(ticks))
         self._serial.overheard()  # and forgotten: nobody watches
 
-    @property
-    def _state(self) -> TableState:
-        """Plant and controller at the present tick."""
-        self._pay()
-        return self._past_state
-
-    @_state.setter
-    def _state(self, state: TableState) -> None:
-        self._past_state = state
-
-    def _pay(self) -> None:
-        """Let the ticks pass that plant and controller are behind."""
-        if self._owed_ticks and not self._resting:
-            run = self._run or run_undisturbed
-            state, resting = run(self._constants, self._past_state, self._load_torque_Nm, self._owed_ticks)
-            # In one statement without a call: Ctrl-C comes before it, and all is still owed, or after it.
-            self._past_state, self._resting, self._owed_ticks = state, resting, 0
-        self._owed_ticks = 0
-
     def _advance_watched(self) -> None:
         """Pass one tick in which the line, an edge, a fault or the observer has its turn."""
         self._serve_faults()
-        before = self._state.drive
-        self._step()
+        machine, before = self._machine, self._machine.state.drive
+        machine.step(self._faults, self.config.driver.supply_V)
         while (fraction := self._triggers.take(self.tick)) is not None:
-            tick_s, end_rad = self._constants.drive.tick_s, self._state.drive.angle_rad
+            tick_s, end_rad = machine.constants.drive.tick_s, machine.state.drive.angle_rad
             self._see_edge(angle_within_tick(before.angle_rad, end_rad, before.speed_rad_s, tick_s, fraction))
         self.tick += 1
         if not self._serial.uart.idle:
@@ -276,16 +252,6 @@ class Table:
         heard, said = self._serial.overheard()
         if self.observer is not None:
             self.observer(self.status(), heard, said)
-
-    def _step(self) -> None:
-        """Take plant and controller one tick on, in whatever state a fault has left them."""
-        constants, state, torque_Nm = self._constants, self._state, self._load_torque_Nm
-        if is_faulty(self._faults):
-            supply_V = self.config.driver.supply_V
-            self._constants, self._state = faulty_step(self._faults, constants, state, torque_Nm, supply_V)
-        else:
-            self._state = step(constants, state, torque_Nm)
-        self._resting = False
 
     def _serve_faults(self) -> None:
         """Let faults begin and end, and replies go on that were held back."""
@@ -296,7 +262,7 @@ class Table:
     def _see_edge(self, angle_rad: float) -> None:
         """Latch the position at an edge of the trigger, unless a fault hides the edge."""
         if self._triggers.sees_edge(self.tick):
-            latched_count = count_at(self._constants.encoder, angle_rad)
+            latched_count = count_at(self._machine.constants.encoder, angle_rad)
             self._registers = self._registers._replace(latched_count=latched_count)
 
     def _carry_out(self, lines: Iterable[bytes | ErrorCode]) -> None:
@@ -314,15 +280,14 @@ class Table:
     def _reply(self, command: Command | ErrorCode) -> bytes:
         """Carry out a command and return its reply; in strict Table 1 mode a refused line has none."""
         if isinstance(command, Command):
-            before = self._state.firmware
-            reply, controller, self._registers = self._interpreter.execute(command, before, self._registers)
-            if controller is not before:
-                self._state = self._state._replace(firmware=controller)
-                self._resting = False
+            state = self._machine.state
+            reply, controller, self._registers = self._interpreter.execute(command, state.firmware, self._registers)
+            if controller is not state.firmware:
+                self._machine.state = state._replace(firmware=controller)
         else:
             reply = Refusal(command)
         serial = self.config.serial
         return b"" if serial.strict and isinstance(reply, Refusal) else encode_reply(reply, serial.decimals)
 
-    def _woken(self, drive: DriveState) -> TableState:
-        return woken(self._constants, drive, Profile.of(self._registers.speed, self._registers.acceleration))
+    def _woken(self, constants: TableConstants, drive: DriveState) -> TableState:
+        return woken(constants, drive, Profile.of(self._registers.speed, self._registers.acceleration))

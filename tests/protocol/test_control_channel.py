@@ -133,6 +133,15 @@ def test_an_answer_of_something_else_is_never_taken_for_a_look_at_a_table(reply:
         ControlChannel(folder / "control")
 
 
+def test_a_stand_in_that_takes_nobody_in_is_not_waited_for(folder: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as deaf, socket.socket(socket.AF_UNIX) as waiting:
+        deaf.bind(str(folder / "control"))
+        deaf.listen(0)
+        waiting.connect(str(folder / "control"))
+        with pytest.raises(BenchError):
+            request(folder / "control", "trigger")
+
+
 def test_a_listener_that_hangs_up_is_named(folder: Path) -> None:
     with answering(folder / "control", lambda _: None), pytest.raises(BenchError, match="hung up without an answer"):
         request(folder / "control", "trigger")

@@ -10,7 +10,6 @@ from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from shutil import which
-from typing import Protocol
 
 from protocol.bench import Bench, BenchError, SimulatedBench, TableFacts, bench_of
 from protocol.conformance.bench.program import failure_of
@@ -33,65 +32,39 @@ _TRIGGER_KEY = "rig.trigger_command"
 _POWER_CYCLE_KEY = "rig.power_cycle_command"
 
 
-class Stand(Protocol):
-    """What the rig can do; calling what is not among the capabilities is an error of the case."""
+class Stand:
+    """What the rig can do beside the wire, here nothing; calling what is not among the capabilities is an error.
 
-    capabilities: frozenset[str]
-
-    @property
-    def facts(self) -> TableFacts | None:
-        """The table's constants, where it can be asked for them."""
-        ...
-
-    def trigger(self) -> None:
-        """Put one edge on the trigger input, now."""
-        ...
-
-    def power_cycle(self) -> None:
-        """Switch the table off and on."""
-        ...
-
-    def preset(self, count: int) -> None:
-        """Switch the table off and on, with its counter at `count`."""
-        ...
-
-    def encoder_deg(self) -> float:
-        """Return the encoder's position now, as it is inside the table."""
-        ...
-
-    def trigger_within(self, share: float) -> float:
-        """Put an edge at a share (0..1) of the table's coming tick, and return the encoder's position at the edge."""
-        ...
-
-
-class WireOnly:
-    """Nobody stands beside the wire."""
+    Attributes:
+        capabilities: what there is.
+        facts: the table's constants, where it can be asked for them.
+    """
 
     capabilities: frozenset[str] = frozenset()
     facts: TableFacts | None = None
 
     def trigger(self) -> None:
-        """Refuse."""
+        """Put one edge on the trigger input, now."""
         raise BenchError("the rig has no way to trigger the table")
 
     def power_cycle(self) -> None:
-        """Refuse."""
+        """Switch the table off and on."""
         raise BenchError("the rig has no way to switch the table off")
 
     def preset(self, count: int) -> None:
-        """Refuse."""
+        """Switch the table off and on, with its counter at `count`."""
         raise BenchError(f"the rig has no way to preset the counter to {count}")
 
     def encoder_deg(self) -> float:
-        """Refuse."""
+        """Return the encoder's position now, as it is inside the table."""
         raise BenchError("the rig does not see the encoder")
 
     def trigger_within(self, share: float) -> float:
-        """Refuse."""
+        """Put an edge at a share (0..1) of the table's coming tick, and return the encoder's position at the edge."""
         raise BenchError(f"the rig cannot trigger the table at {share:g} of a tick")
 
 
-class OnBench(WireOnly):
+class OnBench(Stand):
     """A table with a bench, which does what it is told."""
 
     capabilities = frozenset({TRIGGER, POWER_CYCLE, PRESET})
@@ -135,7 +108,7 @@ class InProcess(OnBench):
         return before_deg + share * (self.encoder_deg() - before_deg)
 
 
-class Programs(WireOnly):
+class Programs(Stand):
     """Programs of the test bench that the profile names; each has done its deed when it ends with status 0.
 
     Raises:
@@ -173,7 +146,7 @@ class Programs(WireOnly):
             raise BenchError(f"the profile's {key}, `{shlex.join(command)}`, {failure}")
 
 
-class RecordedStand:
+class RecordedStand(Stand):
     """Another stand, whose deeds stand in the record of the wire."""
 
     def __init__(self, stand: Stand, note: Callable[[str], None]) -> None:

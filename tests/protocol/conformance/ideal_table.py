@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from protocol.conformance.bench.stand import POWER_CYCLE, PRESET, TRIGGER, WireOnly
+from protocol.conformance.bench.stand import POWER_CYCLE, PRESET, TRIGGER, Stand
 
 _COMMAND = re.compile(rb"([HL]) *|([PRSA]) *([+-]?[0-9]+(?:\.[0-9]+)?) *")
 _WORDS = ("unknown command", "bad number", "out of range", "line too long", "bad byte")
@@ -92,7 +92,7 @@ class Move:
         return self.target, 0.0
 
 
-class IdealTable(WireOnly):
+class IdealTable(Stand):
     """The registers and the commands; also what can be done to it beside the wire."""
 
     capabilities = frozenset({TRIGGER, POWER_CYCLE, PRESET})

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from protocol.conformance.bench.stand import Stand, WireOnly
+from protocol.conformance.bench.stand import Stand
 from protocol.conformance.bench.wire import RecordedPort
 from protocol.conformance.cases.catalogue import all_cases, chosen_cases
 from protocol.conformance.judgement.verdict import Verdict
@@ -63,7 +63,7 @@ def test_a_table_that_is_only_slow_to_answer_fails_by_that_alone(tmp_path: Path)
 
 
 def test_what_such_a_table_lacks_is_said(tmp_path: Path) -> None:
-    outcomes = outcomes_of(Make(), tmp_path, "[rig]\nsees_disconnect = false\n", WireOnly())
+    outcomes = outcomes_of(Make(), tmp_path, "[rig]\nsees_disconnect = false\n", Stand())
     reasons = {outcome.reason for outcome in outcomes if outcome.verdict is Verdict.SKIPPED}
     assert reasons == {
         "lacks a trigger input that the rig can drive",

@@ -13,7 +13,7 @@ import pytest
 from emulator.table.table import Table
 from protocol.bench import BenchError
 from protocol.conformance.__main__ import main
-from protocol.conformance.bench.stand import POWER_CYCLE, TRIGGER, Programs, WireOnly
+from protocol.conformance.bench.stand import POWER_CYCLE, TRIGGER, Programs, Stand
 from protocol.conformance.bench.wire import RecordedPort
 from protocol.conformance.cases.catalogue import chosen_cases
 from protocol.conformance.judgement.verdict import Verdict
@@ -108,7 +108,7 @@ def test_a_power_switch_that_fails_leaves_home_where_it_is() -> None:
     assert round(table.status().encoder_deg, 1) == 33.0
 
 
-class SwitchesAndFails(WireOnly):
+class SwitchesAndFails(Stand):
     """A power switch that does its work, and then fails."""
 
     capabilities = frozenset({POWER_CYCLE})

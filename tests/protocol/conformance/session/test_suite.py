@@ -12,7 +12,7 @@ from emulator.config.table_config import load_config
 from emulator.faults.fault import fault_from
 from emulator.protocol_emulator import Serial
 from protocol.conformance.bench.ports import SessionError
-from protocol.conformance.bench.stand import InProcess, WireOnly, stand_beside
+from protocol.conformance.bench.stand import InProcess, Stand, stand_beside
 from protocol.conformance.bench.wire import RecordedPort, ReopenablePort, Wire
 from protocol.conformance.cases.catalogue import all_cases, chosen_cases
 from protocol.conformance.cases.random_walk import SIMULATED, search, walk
@@ -168,7 +168,7 @@ def test_what_a_table_lacks_is_skipped_with_its_reason(tmp_path: Path) -> None:
         tmp_path, "[motion]\nreach_deg = 10\n[waive]\n'5.2/4' = 'its printf'\n[rig]\nsees_disconnect = false\n"
     )
     port = Serial("emulator://")
-    session = Session(RecordedPort(port), profile, WireOnly())
+    session = Session(RecordedPort(port), profile, Stand())
     reasons = {
         case.id: session.run_case(case).reason
         for case in all_cases()
@@ -211,7 +211,7 @@ def test_a_silent_port_cannot_be_tested() -> None:
 def test_a_port_that_is_no_table_cannot_be_tested() -> None:
     port = RecordedPort(serial.serial_for_url("loop://"))
     with pytest.raises(SessionError, match="is no table of this protocol"):
-        Session(port, load_profile(), WireOnly())
+        Session(port, load_profile(), Stand())
 
 
 def test_a_moving_table_cannot_be_tested() -> None:
