@@ -15,6 +15,7 @@ MODULES = (
     "emulator.firmware.controller",
     "emulator.firmware.fixed_point",
     "emulator.table.interpreter",
+    "emulator.table.control_loop",
     "emulator.firmware.pid",
     "emulator.firmware.profiler",
     "emulator.table.serial_end",

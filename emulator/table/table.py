@@ -12,10 +12,10 @@ from emulator.firmware.profiler import Profile
 from emulator.int32 import wrap_int32
 from emulator.plant.drive_train import DriveState, at_standstill
 from emulator.plant.encoder import angle_within_tick, count_at, recounted
+from emulator.table.control_loop import ControlLoop
 from emulator.table.drive_faults import is_faulty
 from emulator.table.fast_ticks import Run
 from emulator.table.interpreter import Interpreter, Registers
-from emulator.table.machine import Machine
 from emulator.table.serial_end import SerialEnd
 from emulator.table.status import table_facts, table_status
 from emulator.table.tick import TableConstants, TableState, table_constants, woken
@@ -71,7 +71,7 @@ class Table:
         self._run = run
         constants = table_constants(config, encoder_phase=chance.random())
         drive = at_standstill(constants.drive, gap_share=chance.uniform(-1.0, 1.0))
-        self._machine = Machine(constants, self._woken(constants, drive), run=run)
+        self._loop = ControlLoop(constants, self._woken(constants, drive), run=run)
         self._true_zero_rad = 0.0
         self._faults = FaultSchedule(config.faults, tick_hz, seed)
         self._serial = SerialEnd(config, self._faults)
@@ -123,7 +123,7 @@ class Table:
         if not 0.0 <= fraction < 1.0:
             raise ValueError(f"an edge at {fraction} of a tick is outside 0..1")
         if fraction == 0.0:
-            self._see_edge(self._machine.state.drive.angle_rad)
+            self._see_edge(self._loop.state.drive.angle_rad)
         else:
             self._triggers.add_edge(self.tick, fraction)
 
@@ -131,17 +131,17 @@ class Table:
         """Load the table with a torque that resists positive rotation, until it is set anew."""
         if not math.isfinite(torque_Nm):
             raise ValueError(f"a load torque of {torque_Nm} Nm is not finite")
-        self._machine.load_torque_Nm = float(torque_Nm)
+        self._loop.load_torque_Nm = float(torque_Nm)
 
     def reset(self, count: int = 0) -> None:
         """Switch the table off and on: the controller wakes at `count` where the plant is; the plant goes on."""
-        machine, drive = self._machine, self._machine.state.drive
-        encoder = machine.constants.encoder
-        machine.constants = machine.constants._replace(encoder=recounted(encoder, drive.angle_rad, count))
-        self._true_zero_rad = (drive.angle_rad - count / encoder.count_rad) * machine.constants.drive.table_per_motor
+        loop, drive = self._loop, self._loop.state.drive
+        encoder = loop.constants.encoder
+        loop.constants = loop.constants._replace(encoder=recounted(encoder, drive.angle_rad, count))
+        self._true_zero_rad = (drive.angle_rad - count / encoder.count_rad) * loop.constants.drive.table_per_motor
         self.disconnect()
         self._registers = self._interpreter.power_on()._replace(latched_count=wrap_int32(count))
-        machine.state = self._woken(machine.constants, drive)
+        loop.state = self._woken(loop.constants, drive)
 
     @property
     def received_queue(self) -> int:
@@ -161,12 +161,12 @@ class Table:
         """Return what can be seen of the table now."""
         return table_status(
             self.config,
-            self._machine.state,
+            self._loop.state,
             self._serial.uart,
-            encoder=self._machine.constants.encoder,
+            encoder=self._loop.constants.encoder,
             tick=self.tick,
             latched_count=self._registers.latched_count,
-            load_torque_Nm=self._machine.load_torque_Nm,
+            load_torque_Nm=self._loop.load_torque_Nm,
             true_zero_rad=self._true_zero_rad,
         )
 
@@ -175,13 +175,13 @@ class Table:
         return copy.deepcopy(
             Snapshot(
                 self.tick,
-                self._machine.constants,
-                self._machine.state,
+                self._loop.constants,
+                self._loop.state,
                 self._registers,
                 self._serial,
                 self._triggers,
                 self._faults,
-                self._machine.load_torque_Nm,
+                self._loop.load_torque_Nm,
                 self._true_zero_rad,
             )
         )
@@ -199,7 +199,7 @@ class Table:
             load_torque_Nm,
             self._true_zero_rad,
         ) = copy.deepcopy(snapshot)
-        self._machine = Machine(constants, state, load_torque_Nm, self._run)
+        self._loop = ControlLoop(constants, state, load_torque_Nm, self._run)
 
     def advance(self, ticks: int) -> None:
         """Let simulated time pass."""
@@ -214,7 +214,7 @@ class Table:
                 self._advance_undisturbed(event)
         self._serve_faults()
         if self._run is None:
-            self._machine.catch_up()
+            self._loop.catch_up()
 
     def _is_busy(self) -> bool:
         """Return whether each tick needs a look: at the line, by the observer, or for a drive that is not sound."""
@@ -233,7 +233,7 @@ class Table:
     def _advance_undisturbed(self, end: int) -> None:
         """Pass ticks in which nothing comes from outside; a state that repeats itself stays to the end."""
         ticks = end - self.tick
-        self._machine.pass_ticks(ticks)
+        self._loop.pass_ticks(ticks)
         self.tick = end
         self._carry_out(self._serial.pass_ticks(ticks))
         self._serial.overheard()  # and forgotten: nobody watches
@@ -241,10 +241,10 @@ class Table:
     def _advance_watched(self) -> None:
         """Pass one tick in which the line, an edge, a fault or the observer has its turn."""
         self._serve_faults()
-        machine, before = self._machine, self._machine.state.drive
-        machine.step(self._faults, self.config.driver.supply_V)
+        loop, before = self._loop, self._loop.state.drive
+        loop.step(self._faults, self.config.driver.supply_V)
         while (fraction := self._triggers.take(self.tick)) is not None:
-            tick_s, end_rad = machine.constants.drive.tick_s, machine.state.drive.angle_rad
+            tick_s, end_rad = loop.constants.drive.tick_s, loop.state.drive.angle_rad
             self._see_edge(angle_within_tick(before.angle_rad, end_rad, before.speed_rad_s, tick_s, fraction))
         self.tick += 1
         if not self._serial.uart.idle:
@@ -262,7 +262,7 @@ class Table:
     def _see_edge(self, angle_rad: float) -> None:
         """Latch the position at an edge of the trigger, unless a fault hides the edge."""
         if self._triggers.sees_edge(self.tick):
-            latched_count = count_at(self._machine.constants.encoder, angle_rad)
+            latched_count = count_at(self._loop.constants.encoder, angle_rad)
             self._registers = self._registers._replace(latched_count=latched_count)
 
     def _carry_out(self, lines: Iterable[bytes | ErrorCode]) -> None:
@@ -280,10 +280,10 @@ class Table:
     def _reply(self, command: Command | ErrorCode) -> bytes:
         """Carry out a command and return its reply; in strict Table 1 mode a refused line has none."""
         if isinstance(command, Command):
-            state = self._machine.state
+            state = self._loop.state
             reply, controller, self._registers = self._interpreter.execute(command, state.firmware, self._registers)
             if controller is not state.firmware:
-                self._machine.state = state._replace(firmware=controller)
+                self._loop.state = state._replace(firmware=controller)
         else:
             reply = Refusal(command)
         serial = self.config.serial

@@ -39,7 +39,7 @@ class Mutant(Table):
 
     @property
     def moving(self) -> bool:
-        return self._machine.state.firmware.motion in {MOVING, SETTLING}
+        return self._loop.state.firmware.motion in {MOVING, SETTLING}
 
     @property
     def bits(self) -> int:
@@ -47,28 +47,30 @@ class Mutant(Table):
         return self.config.motion_bits
 
     def position(self) -> Decimal:
-        return self._interpreter.angle_deg(self._machine.state.firmware.counts[-1])
+        return self._interpreter.angle_deg(self._loop.state.firmware.counts[-1])
 
     def target(self) -> Decimal:
-        reference = self._machine.state.firmware.reference
+        reference = self._loop.state.firmware.reference
         fixed = (reference.position_count + reference.distance_count << self.bits) + reference.fraction
         return Decimal(fixed + reference.distance_fraction) / (1 << self.bits) / 512
 
     def braking_way(self) -> Decimal:
         """How far the reference still goes when it brakes now with the acceleration of its motion."""
-        speed, acceleration = self._machine.state.firmware.reference.speed, self._machine.state.firmware.profile.acceleration
+        speed, acceleration = self._loop.state.firmware.reference.speed, self._loop.state.firmware.profile.acceleration
         return Decimal(speed * abs(speed) // (2 * acceleration)) / (1 << self.bits) / 512
 
     def rerun(self, speed: int, acceleration: int) -> None:
         """Give the running motion another profile."""
-        controller = self._machine.state.firmware
-        self._machine.state = self._machine.state._replace(firmware=controller._replace(profile=Profile.of(speed, acceleration)))
+        controller = self._loop.state.firmware
+        self._loop.state = self._loop.state._replace(
+            firmware=controller._replace(profile=Profile.of(speed, acceleration))
+        )
 
     def step_to(self, speed: int) -> None:
         """Let the reference have another speed at once."""
-        controller = self._machine.state.firmware
+        controller = self._loop.state.firmware
         stepped = controller._replace(reference=controller.reference._replace(speed=speed))
-        self._machine.state = self._machine.state._replace(firmware=stepped)
+        self._loop.state = self._loop.state._replace(firmware=stepped)
 
 
 class RereadsLines(Mutant):

@@ -54,7 +54,7 @@ class QueuesWhatLiesBehind(QueuesMotions):
 
     def waits(self, command: Command) -> bool:
         way = value_of(command) - (self.position() if command.verb is Verb.MOVE_TO else 0)
-        return way * self._machine.state.firmware.reference.speed < 0
+        return way * self._loop.state.firmware.reference.speed < 0
 
 
 class StepsToStandstill(Rereads):
@@ -90,7 +90,7 @@ class TurnsOnTheSpot(StepsToStandstill):
     """going backwards it does not brake for a target behind"""
 
     def steps(self, command: Command) -> bool:
-        return self._machine.state.firmware.reference.speed < 0 and value_of(command) > self.position()
+        return self._loop.state.firmware.reference.speed < 0 and value_of(command) > self.position()
 
 
 @caught_by("7.3/3:near")
@@ -121,7 +121,7 @@ class StepsToALowerSpeed(Mutant):
     def _reply(self, command: Line) -> bytes:
         reply = super()._reply(command)
         if verb_of(command) is Verb.MOVE_TO:
-            top, speed = self._registers.speed, self._machine.state.firmware.reference.speed
+            top, speed = self._registers.speed, self._loop.state.firmware.reference.speed
             self.step_to(max(-top, min(top, speed)))
         return reply
 
@@ -134,7 +134,7 @@ class KeepsTheOld(Mutant):
         raise NotImplementedError
 
     def _reply(self, command: Line) -> bytes:
-        before, was_moving = self._machine.state.firmware.profile, self.moving
+        before, was_moving = self._loop.state.firmware.profile, self.moving
         reply = super()._reply(command)
         if was_moving and verb_of(command) in MOTIONS:
             self.rerun(*self.kept(before.speed, before.acceleration))
@@ -173,7 +173,7 @@ class StartsFromTheMotor(Rereads):
 
     def instead(self, command: Command) -> Command:
         if self.moving:
-            controller = self._machine.state.firmware
+            controller = self._loop.state.firmware
             window_ticks = self.config.control.speed_window_ticks
             self.start_from((controller.pid.measured << self.bits) // window_ticks)
         return command

@@ -102,7 +102,7 @@ class Renders(Mutant):
         if reply[:2] not in {b"H ", b"L "}:
             return reply
         self.reads_latch = reply[:1] == b"L"
-        count = self._registers.latched_count if self.reads_latch else self._machine.state.firmware.counts[-1]
+        count = self._registers.latched_count if self.reads_latch else self._loop.state.firmware.counts[-1]
         return reply[:2] + self.form(Decimal(count) / 512).encode() + b"\r"
 
 

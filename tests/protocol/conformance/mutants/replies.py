@@ -55,7 +55,7 @@ class AnnouncesArrival(Mutant):
 
     def advance(self, ticks: int) -> None:
         super().advance(ticks)
-        if self.was_moving and self._machine.state.firmware.motion == IDLE:
+        if self.was_moving and self._loop.state.firmware.motion == IDLE:
             self._serial.write(b"DONE\r", self.tick)
         self.was_moving = self.moving
 

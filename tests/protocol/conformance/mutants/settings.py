@@ -13,7 +13,7 @@ class SpeedAtOnce(Mutant):
     def _reply(self, command: Line) -> bytes:
         reply = super()._reply(command)
         if verb_of(command) is Verb.SET_SPEED:
-            self.rerun(self._registers.speed, self._machine.state.firmware.profile.acceleration)
+            self.rerun(self._registers.speed, self._loop.state.firmware.profile.acceleration)
         return reply
 
 
@@ -24,7 +24,7 @@ class AccelerationAtOnce(Mutant):
     def _reply(self, command: Line) -> bytes:
         reply = super()._reply(command)
         if verb_of(command) is Verb.SET_ACCELERATION:
-            self.rerun(self._machine.state.firmware.profile.speed, self._registers.acceleration)
+            self.rerun(self._loop.state.firmware.profile.speed, self._registers.acceleration)
         return reply
 
 
@@ -116,7 +116,7 @@ class KeepsItsCount(Mutant):
     """the position outlives the power"""
 
     def reset(self, count: int = 0) -> None:
-        super().reset(count or self._machine.state.firmware.counts[-1])
+        super().reset(count or self._loop.state.firmware.counts[-1])
 
 
 class TakesNothingForLittle(Mutant):

@@ -129,7 +129,7 @@ class StopsAtTheEndOfTheCounter(Rereads):
     """at the end of the counter it stops"""
 
     def instead(self, command: Command) -> Command | None:
-        beyond = abs(self._machine.state.firmware.counts[-1] + int(value_of(command) * 512)) >= 2**31
+        beyond = abs(self._loop.state.firmware.counts[-1] + int(value_of(command) * 512)) >= 2**31
         return None if command.verb is Verb.MOVE_BY and beyond else command
 
 
@@ -140,9 +140,9 @@ class StumblesOverTheEnd(Mutant):
     says = "over the end and back"
 
     def advance(self, ticks: int) -> None:
-        before = self._machine.state.firmware.reference.position_count
+        before = self._loop.state.firmware.reference.position_count
         super().advance(ticks)
-        if abs(self._machine.state.firmware.reference.position_count - before) > 2**31:
+        if abs(self._loop.state.firmware.reference.position_count - before) > 2**31:
             self.step_to(0)
 
 

@@ -17,7 +17,7 @@ class LatchesForwards(Mutant):
     """it latches in motions forwards only"""
 
     def trigger(self, fraction: float = 0.0) -> None:
-        if self._machine.state.firmware.reference.speed >= 0:
+        if self._loop.state.firmware.reference.speed >= 0:
             super().trigger(fraction)
 
 
@@ -157,7 +157,7 @@ class LatchesTheTicksCount(Mutant):
     """the latch is the count at the beginning of the tick"""
 
     def _see_edge(self, angle_rad: float) -> None:  # noqa: ARG002 - that is what is wrong
-        self._registers = self._registers._replace(latched_count=self._machine.state.firmware.counts[-2])
+        self._registers = self._registers._replace(latched_count=self._loop.state.firmware.counts[-2])
 
 
 def torn_latch(bits: int, upper_is_old: bool) -> None:
@@ -167,7 +167,7 @@ def torn_latch(bits: int, upper_is_old: bool) -> None:
         def _see_edge(self, angle_rad: float) -> None:
             super()._see_edge(angle_rad)
             lower = (1 << bits) - 1
-            old, new = self._machine.state.firmware.counts[-2], self._registers.latched_count
+            old, new = self._loop.state.firmware.counts[-2], self._registers.latched_count
             torn = (old & ~lower) | (new & lower) if upper_is_old else (new & ~lower) | (old & lower)
             self._registers = self._registers._replace(latched_count=torn)
 

@@ -6,8 +6,8 @@ from emulator.table.fast_ticks import Run
 from emulator.table.tick import TableConstants, TableState, run_undisturbed, step
 
 
-class Machine:
-    """Plant and controller.
+class ControlLoop:
+    """Plant and controller, level with the table when they are looked at.
 
     Args:
         constants: per tick.
