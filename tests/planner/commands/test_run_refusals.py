@@ -232,3 +232,15 @@ def test_a_scan_or_map_that_fails_leaves_none_of_another(command: str, names: li
     assert main([command, "no-such-scan", "--out", str(tmp_path)]) == 2
     assert names_in(tmp_path) == set()
     assert names_in(tmp_path / "previous") == set(names)
+
+
+def test_a_control_channel_on_which_nobody_answers_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan_file, control = write_short_scan(tmp_path), tmp_path / "none"
+    words = ["--port", "emulator://", "--control", str(control), "--out", str(tmp_path / "run")]
+    assert main(["run", str(plan_file), *words]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith(f"{control}: ")
+    assert "--control socket" in said
+    assert names_in(tmp_path / "run") == set()
