@@ -39,11 +39,8 @@ SERVED_SIGNALS = (*_END_SIGNALS, _TRIGGER_SIGNAL)
 class Server:
     """Serves a table in real time, on any number of ports that are all the same wire.
 
-    Attributes:
-        table: the table, level with the clock whenever the control channel acts on it.
-
     Args:
-        table: the table; nobody else touches it while the server runs.
+        table: the table; while the server runs, only its control channel touches it besides.
         clock: counts the ticks that are due; at 0 when the table was switched on.
         ports: where clients come in. Replies go to all of them.
         signals: entered before the ports' names are published.

@@ -127,7 +127,8 @@ class ProbeOnPort:
         now_s = min(self._end_s, self._table.tick / self._tick_hz)
         if self._start_s >= now_s:
             return np.zeros(0)
-        return self._start_s + self._period_s * np.arange(np.ceil((now_s - self._start_s) / self._period_s))
+        taken = np.ceil((now_s - self._start_s) / self._period_s)
+        return self._start_s + self._period_s * np.arange(taken, dtype=np.float64)
 
     def truth(self) -> TableTruth:
         """Return where the table truly was at each trigger."""
