@@ -15,9 +15,7 @@ from protocol.bench import TableFacts, TableStatus
 def table_facts(config: TableConfig) -> TableFacts:
     """Return the constants that clients may rely on."""
     limits = config.limits
-    return TableFacts(
-        config.control.tick_hz, config.counts_per_turn / 360.0, limits.speed_deg_s, limits.acceleration_deg_s2
-    )
+    return TableFacts(config.control.tick_hz, config.counts_per_deg, limits.speed_deg_s, limits.acceleration_deg_s2)
 
 
 def table_status(
