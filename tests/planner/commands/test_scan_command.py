@@ -14,6 +14,7 @@ from planner.cell.scan import load_scan
 from planner.defaults import shipped_scans
 from planner.execution.free_way import WayError
 from planner.map.synthetic_maps import blocks_map
+from planner.planning import scan_planning
 from planner.planning.arm_motion import ArmMotion, arm_motion
 from planner.planning.plan import Plan
 from planner.scanning import scan_run
@@ -227,7 +228,7 @@ def test_a_scan_whose_arm_path_breaks_a_limit_is_refused_before_the_port_is_open
         found = arm_motion(*arguments)
         return replace(found, joints=found.joints + np.radians([0.0, 0.0, 0.0, 0.0, 0.0, 720.0]))
 
-    monkeypatch.setattr(scan_run, "arm_motion", two_turns_on)
+    monkeypatch.setattr(scan_planning, "arm_motion", two_turns_on)
     monkeypatch.setattr(scan_run, "open_port", lambda *_: pytest.fail("the port was opened"))
     assert main(["scan", scan_file, *QUICK, "--exact-calibration", "--out", str(tmp_path / "out")]) == 2
     shown = capsys.readouterr()

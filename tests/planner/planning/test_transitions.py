@@ -52,6 +52,6 @@ def test_steps_that_leave_the_grid_are_none() -> None:
 
 def test_the_cost_is_that_of_the_acceleration_in_units() -> None:
     grid = Grid(36, 0.0, 10.0, 2, np.array([-1, 0, 2]))
-    steps = lay_out_transitions(PROBLEMS[1].terms, grid, unit=0.5)
+    steps = lay_out_transitions(PROBLEMS[1].terms, grid, 0.5)
     weight = PROBLEMS[1].terms.acceleration_weight
     assert steps.cost[2] == pytest.approx([weight * 20.0**2 / 0.5, 0.0, weight * 40.0**2 / 0.5])
