@@ -72,17 +72,17 @@ PROTOCOL_EDGE = {
     "protocol/quiet_start.py": {"os", "signal"},
     "protocol/conformance/__main__.py": {"pathlib"},
     "protocol/data_file.py": {"pathlib"},
-    "protocol/conformance/pytest/fixture.py": {"os", "pathlib", "subprocess"},
+    "protocol/conformance/pytest/fixture.py": {"pathlib", "subprocess"},
     "protocol/conformance/bench/host_watch.py": {"os", "select", "threading", "time"},
     "protocol/conformance/bench/ports.py": {"pathlib", "serial"},
     "protocol/conformance/profile/profile.py": {"pathlib"},
     "protocol/conformance/bench/program.py": {"os", "signal", "subprocess"},
-    "protocol/conformance/pytest/plugin.py": {"pathlib"},
     "protocol/conformance/results/record.py": {"pathlib"},
     "protocol/conformance/commands/replay_run.py": {"pathlib"},
     "protocol/conformance/results/report.py": {"pathlib"},
     "protocol/conformance/bench/stand.py": {"pathlib"},
     "protocol/conformance/commands/suite_run.py": {"datetime", "os", "pathlib"},
+    "protocol/own_program.py": {"os", "pathlib"},
     "protocol/serial_port.py": {"serial"},
     "protocol/whole_file.py": {"os", "pathlib"},
 }
@@ -185,6 +185,25 @@ def test_the_core_needs_nothing_but_itself_and_the_standard_library(room: str) -
     for source in (ROOT / "emulator" / room).glob("*.py"):
         for name in imported_modules(source):
             assert f"{name}.".startswith(ours) or name.partition(".")[0] in sys.stdlib_module_names, (source, name)
+
+
+def test_tools_is_a_namespace_package_that_leaves_room_for_others() -> None:
+    assert not (ROOT / "tools" / "__init__.py").exists()
+
+
+def test_what_is_installed_at_the_top_level_imports_nothing_of_ours_before_it_is_needed() -> None:
+    for source in (ROOT / "tools" / "top_level" / "seventh_axis").glob("*.py"):
+        at_once = ast.parse(source.read_text(encoding="utf-8")).body
+        names = [alias.name for node in at_once if isinstance(node, ast.Import) for alias in node.names]
+        names += [str(node.module) for node in at_once if isinstance(node, ast.ImportFrom)]
+        assert not MAY_IMPORT.keys() & {name.partition(".")[0] for name in names}, source
+
+
+def test_a_program_of_ours_is_started_so_that_nothing_shadows_it() -> None:
+    for package in MAY_IMPORT:
+        for source in (ROOT / package).rglob("*.py"):
+            if source.name != "own_program.py":
+                assert 'sys.executable, "-m"' not in source.read_text(encoding="utf-8"), source
 
 
 def touched_at_the_edge(package: str) -> dict[str, set[str]]:

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 from emulator.table.fast_ticks import LOADED_TICKS
 from protocol.progress import share_shown
+from protocol.own_program import own_environment, own_program
 from tools.command_line import ended
 from tools.mutation import COMPILED, MODULES, Mutation, mutations_of, planted
 
@@ -73,8 +74,8 @@ def verdict_on(mutation: Mutation, seed: int) -> str:
 
 def verdict_in_a_process(index: int, seed: int) -> str:
     """Return the verdict on a mutation from a process of its own: it may hang or crash."""
-    command = [sys.executable, "-m", "tools.mutants", "--only", str(index), "--seed", str(seed)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    command = own_program("tools.mutants", "--only", str(index), "--seed", str(seed))
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=own_environment())
     if done.returncode:
         return f"status {done.returncode}: {done.stderr.strip().splitlines()[-1:]}"
     return str(json.loads(done.stdout))

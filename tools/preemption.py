@@ -11,6 +11,7 @@ from pathlib import Path
 
 from emulator.trace import read_trace
 from protocol import TableClient
+from protocol.own_program import own_environment, own_program
 from tools.plot_trace import draw_trace, save_figure
 
 STEPS = (  # after how many seconds, top speed deg/s, acceleration deg/s2, target deg
@@ -57,8 +58,10 @@ def stand_in(*arguments: str) -> Iterator[str]:
 
     Ctrl-C at the terminal does not reach it: the table has to be there to be stopped.
     """
-    command = [sys.executable, "-m", "emulator", *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
+    command = own_program("emulator", *arguments)
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, start_new_session=True, env=own_environment()
+    ) as process:
         assert process.stdout is not None
         try:
             yield process.stdout.readline().strip()

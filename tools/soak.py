@@ -21,6 +21,7 @@ from protocol.client import TableClient
 from protocol.codec import decode_reply
 from protocol.errors import TableError
 from protocol.messages import Angle, Ok, Refusal
+from protocol.own_program import own_environment, own_program
 from tools.command_line import ended
 
 _TICK_HZ = 1000
@@ -214,8 +215,10 @@ def _descriptors(process: "subprocess.Popen[str]") -> int:
 @contextmanager
 def _stand_in(link: Path) -> "Iterator[tuple[str, subprocess.Popen[str]]]":
     """Run a stand-in on a pty under a link."""
-    command = [sys.executable, "-m", "emulator", "--pty", "--link", str(link), "--baud", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+    command = own_program("emulator", "--pty", "--link", str(link), "--baud", "0")
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=own_environment()
+    ) as process:
         assert process.stdout is not None
         try:
             process.stdout.readline()

@@ -23,6 +23,7 @@ from emulator.table import batch
 from emulator.table.interpreter import Interpreter
 from emulator.table.table import Table
 from emulator.table.tick import TableConstants, TableState
+from protocol.own_program import own_environment, own_program
 from tools.bench.timing import median_s, percentile, print_table
 from tools.bench.virtual_run import random_run_inputs, run_in_virtual_time
 
@@ -67,8 +68,8 @@ def _bench_growth(stream: TextIO) -> None:
         ("interpreted, a day with 24 motions", 90.0, 24, 86_400.0),
         ("interpreted, a week with 168 motions", 90.0, 168, 7 * 86_400.0),
     ):
-        command = [sys.executable, "-m", "tools.bench.interpreted_run", str(angle_deg), str(motions), str(simulated_s)]
-        answer = subprocess.run(command, check=True, capture_output=True, text=True)
+        command = own_program("tools.bench.interpreted_run", str(angle_deg), str(motions), str(simulated_s))
+        answer = subprocess.run(command, check=True, capture_output=True, text=True, env=own_environment())
         wall_s, peak_mb = (float(number) for number in answer.stdout.split())
         rows.append((name, f"{wall_s / simulated_s * 1e6:.2f}", f"{peak_mb:.0f} MB"))
     header = ("simulated time (interpreted: alone in its process)", "us of work per s", "peak memory")
@@ -125,7 +126,7 @@ def _bench_start(stream: TextIO) -> None:
 
         return run
 
-    ours = median_s(ready([sys.executable, "-m", "emulator", "--pty"]))
+    ours = median_s(ready(own_program("emulator", "--pty")))
     bare = median_s(ready([sys.executable, "-c", "print(flush=True); import time; time.sleep(9)"]))
     rows = [("python, first line", f"{bare:.3f} s"), ("python -m emulator --pty, first line", f"{ours:.3f} s")]
     print_table(stream, "Start to ready", ("program", "median"), rows)
@@ -229,8 +230,10 @@ def _raw_echo() -> Iterator[tuple[str, None]]:
 
 @contextmanager
 def _stand_in(*arguments: str) -> Iterator[tuple[str, "subprocess.Popen[str]"]]:
-    command = [sys.executable, "-m", "emulator", *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+    command = own_program("emulator", *arguments)
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=own_environment()
+    ) as process:
         assert process.stdout is not None
         try:
             yield process.stdout.readline().strip(), process

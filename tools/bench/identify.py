@@ -6,7 +6,6 @@ python -m tools.bench identify --pty    ten random tables over pseudo-terminals,
 """
 
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -19,6 +18,7 @@ from typing import NamedTuple, TextIO
 import emulator  # noqa: F401  # teaches pyserial the port emulator://
 from emulator.config.table_config import load_config
 from protocol.client import TableClient
+from protocol.own_program import own_environment, own_program
 from tools.bench.identify_tables import DEFAULT, NARROW, WIDE, Family, write_constants
 from tools.bench.timing import percentile, print_row, print_table
 from tools.identification.constants import DERIVED
@@ -144,8 +144,10 @@ def _within(outcome: Outcome, family: Family) -> bool:
 def _recorded(config: Path, seed: int, pty: bool) -> WireRecording:
     if not pty:
         return _record_over(f"emulator://?config={config}&seed={seed}")
-    command = [sys.executable, "-m", "emulator", "--pty", "--config", str(config), "--seed", str(seed)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as table:
+    command = own_program("emulator", "--pty", "--config", str(config), "--seed", str(seed))
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=own_environment()
+    ) as table:
         assert table.stdout
         try:
             return _record_over(table.stdout.readline().strip())

@@ -21,6 +21,7 @@ from planner.kinematics.configuration import Configuration
 from planner.kinematics.inverse_kinematics import inverse_kinematics
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import MapProblem, map_problem
+from protocol.own_program import own_environment, own_program
 from tools.bench.timing import median_s, print_table
 
 POSES = 20_000
@@ -128,10 +129,11 @@ def _bench_growth(stream: TextIO) -> None:
     rows = []
     for locations, angles in ((100, 100), (1000, 100), (100, 1440), (1000, 1440)):
         answer = subprocess.run(
-            [sys.executable, "-m", "tools.bench.map", str(locations), str(angles)],
+            own_program("tools.bench.map", str(locations), str(angles)),
             check=True,
             capture_output=True,
             text=True,
+            env=own_environment(),
         )
         seconds, peak_mb = (float(number) for number in answer.stdout.split())
         cells = 8 * locations * angles

@@ -1,8 +1,6 @@
 """What the fixture `rotary_table` gives to a test."""
 
-import os
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
@@ -19,7 +17,10 @@ from protocol.conformance.bench.stand import POWER_CYCLE, TRIGGER, Stand, stand_
 from protocol.conformance.bench.wire import ReopenablePort
 from protocol.conformance.profile.profile import Profile, ProfileError, load_profile
 from protocol.errors import TableError
+from protocol.own_program import own_environment, own_program
 
+PTY = "pty"
+"""In the place of a port's URL: a fresh stand-in on a pseudo-terminal."""
 _START_S = 20.0
 
 
@@ -101,10 +102,9 @@ class RotaryTable:
 def pty_stand_in(folder: Path) -> Iterator[tuple[str, Path]]:
     """Run a stand-in on a pseudo-terminal; yield its device and its control channel."""
     control = folder / "control"
-    command = [sys.executable, "-m", "emulator", "--pty", "--control", str(control)]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    command = own_program("emulator", "--pty", "--control", str(control))
     with subprocess.Popen(  # noqa: S603 - this very interpreter, with words of our own
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=own_environment()
     ) as process:
         assert process.stdout is not None
         assert process.stderr is not None

@@ -15,8 +15,7 @@ from protocol.conformance.cases.case import Case
 from protocol.conformance.cases.catalogue import all_cases
 from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import ProfileError, load_profile
-from protocol.conformance.pytest.fixture import pty_stand_in
-from protocol.conformance.pytest.plugin import PTY
+from protocol.conformance.pytest.fixture import PTY, pty_stand_in
 from protocol.conformance.session.suite import Session, session_at
 from protocol.interrupts import ended_by_signals
 

@@ -77,7 +77,7 @@ def test_ctrl_c_and_a_polite_kill_stop_the_table_and_leave_the_record(
 
 
 def test_a_polite_kill_of_pytest_stops_the_table_too(stand_in: StandIn, tmp_path: Path) -> None:
-    plugin = ["-p", "no:cacheprovider", "-p", "protocol.conformance.pytest.plugin"]
+    plugin = ["-p", "no:cacheprovider", "-p", "seventh_axis.pytest_plugin"]
     table = ["--table-port", stand_in.port, "--table-control", str(stand_in.control), "--table-yes"]
     command = [sys.executable, "-m", "pytest", *plugin, "--pyargs", "protocol.conformance", *table, "-k", "4.2/3"]
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}

@@ -1,6 +1,7 @@
 """A plug-in for pytest: the fixture `rotary_table` for anybody's tests, and the options of the conformance suite.
 
-It is loaded by every run of pytest where this package is installed, so that it imports nothing before it is asked for.
+It is loaded by every run of pytest where this package is installed. It imports nothing of ours before a test uses the
+fixture, so that a project may have packages of the same names.
 """
 
 from collections.abc import Iterator
@@ -9,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+
+from seventh_axis.home import hidden
 
 if TYPE_CHECKING:
     from protocol.conformance.pytest.fixture import RotaryTable
@@ -43,6 +46,9 @@ def rotary_table(
     rotary_table_port: str, pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator["RotaryTable"]:
     """A table that is fresh for each test: `.client` talks to it, `.url` opens it, `.trigger()` is the probe."""
+    for package in ("protocol", "emulator") if rotary_table_port.startswith(IN_PROCESS) else ("protocol",):
+        if clash := hidden(package):
+            pytest.fail(f"rotary_table: {clash}", pytrace=False)
     from protocol.conformance.pytest.fixture import RotaryTable, pty_stand_in  # noqa: PLC0415 - see the module's docstring
 
     control = pytestconfig.getoption("--table-control")

@@ -16,7 +16,7 @@ import pytest
 
 from protocol.conformance.cases.catalogue import all_cases
 
-ROOT = Path(__file__).parents[4]
+ROOT = Path(__file__).parents[3]
 
 
 def run_pytest(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
@@ -28,7 +28,7 @@ def run_pytest(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
         "-p",
         "no:cacheprovider",
         "-p",
-        "protocol.conformance.pytest.plugin",
+        "seventh_axis.pytest_plugin",
     ]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     return subprocess.run(

@@ -1,0 +1,31 @@
+"""Where the packages of this project are installed, and which other package an import would find in their place."""
+
+import sys
+from importlib.machinery import ModuleSpec, PathFinder
+from pathlib import Path
+
+_ABOVE = Path(__file__).resolve().parents
+HOME = next(folder for folder in (_ABOVE[1], _ABOVE[3]) if (folder / "protocol" / "py.typed").is_file())
+"""The folder of the packages: beside this one where it is installed, three folders up in a clone."""
+
+
+def hidden(package: str) -> str:
+    """Return in one sentence what hides a package of this project from an import; empty where nothing does."""
+    loaded = sys.modules.get(package)
+    found = PathFinder.find_spec(package) if loaded is None else loaded.__spec__
+    places = _places(found)
+    if HOME / package in places:
+        return ""
+    if not places:
+        return f"{package}: the package of seventh-axis is not on the path; add {HOME} to it"
+    return (
+        f"{places[0]} hides the package {package} of seventh-axis; rename it, or see 'Name clashes' in docs/install.md"
+    )
+
+
+def _places(found: ModuleSpec | None) -> list[Path]:
+    """Return the folders of a package, or the file of a module."""
+    if found is None:
+        return []
+    places = found.submodule_search_locations or ([found.origin] if found.origin else [])
+    return [Path(place).resolve() for place in places]
