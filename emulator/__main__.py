@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from emulator.config.table_config import TableConfig, load_config
 from emulator.config.toml_section import ConfigError
@@ -20,6 +20,7 @@ from emulator.server.server import SERVED_SIGNALS, Server
 from emulator.server.signals import SignalWatch
 from emulator.table.table import Table
 from emulator.trace import TraceError, TraceWriter
+from protocol.command_line import Parser, program_name
 
 _EXAMPLE = """example:
   python -m emulator --pty --link ./table &
@@ -37,13 +38,6 @@ if TYPE_CHECKING:
 
 class UsageError(Exception):
     """The command line or its surroundings do not allow a start; the message says what to do."""
-
-
-class _Parser(argparse.ArgumentParser):
-    """An argument parser whose errors are one line."""
-
-    def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message} (--help shows all options)")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -68,7 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _parse(arguments: list[str] | None) -> argparse.Namespace:
-    options = _parser().parse_args(arguments)
+    options = parser().parse_args(arguments)
     if not (options.pty or options.tcp or options.rfc2217):
         raise UsageError("give --pty, --tcp, --rfc2217 or several of them (--help shows all options)")
     if options.link and not options.pty:
@@ -76,15 +70,15 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     return options
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
-        prog="python -m emulator",
+def parser() -> Parser:
+    """Return the parser of the command line."""
+    one = Parser(
+        prog=program_name("emulator"),
         description="A stand-in rotary table behind a virtual serial port.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
-    add = parser.add_argument
+    add = one.add_argument
     add("--pty", action="store_true", help="open a pseudo-terminal and print its device")
     add("--link", metavar="PATH", type=Path, help="a symbolic link to the pseudo-terminal, removed at the end")
     add("--tcp", metavar="[HOST:]PORT", type=_address, help="listen on TCP and print the URL; port 0 is any free one")
@@ -98,7 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--control", metavar="PATH", type=Path, help="a Unix socket for python -m emulator.control_client")
     add("--trace", metavar="FILE", type=Path, help="record every tick in a .csv or .npz file")
     add("--seed", metavar="N", type=_seed, default=0, help="seed of all that is left to chance (default 0)")
-    return parser
+    return one
 
 
 def _address(text: str) -> tuple[str, int]:

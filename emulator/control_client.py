@@ -7,6 +7,7 @@ from pathlib import Path
 
 from emulator.server.control_commands import COMMANDS
 from protocol.bench import BenchError
+from protocol.command_line import Parser, program_name
 from protocol.control_channel import request
 
 __all__ = ["main", "request"]
@@ -20,7 +21,7 @@ _EXAMPLE = """example:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit status."""
-    parsed = _parser().parse_args(arguments)
+    parsed = parser().parse_args(arguments)
     given = {parameter.name: getattr(parsed, parameter.name) for parameter in COMMANDS[parsed.command].parameters}
     parameters = {name: value for name, value in given.items() if value is not None}
     try:
@@ -33,21 +34,22 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m emulator.control_client",
+def parser() -> Parser:
+    """Return the parser of the command line."""
+    one = Parser(
+        prog=program_name("emulator.control_client"),
         description="Act on a running stand-in apart from the wire.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("path", metavar="PATH", type=Path, help="the socket that the stand-in was given with --control")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    one.add_argument("path", metavar="PATH", type=Path, help="the socket that the stand-in was given with --control")
+    commands = one.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, command in COMMANDS.items():
         subparser = commands.add_parser(name, help=command.help, description=command.help)
         for parameter in command.parameters:
             flag = "--" + parameter.name.replace("_", "-") if parameter.optional else parameter.name
             subparser.add_argument(flag, type=float, help=parameter.help)
-    return parser
+    return one
 
 
 if __name__ == "__main__":

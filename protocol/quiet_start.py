@@ -1,20 +1,23 @@
 """Imported first by each package that holds programs: Ctrl-C during the imports ends them with one line.
 
-The status is 130, and there is no traceback from whatever was being imported. Only a program of this project that was
-started as `python -m planner ...` is ended so; one that imports these packages as a library keeps its own signals.
+The status is 130, and there is no traceback from whatever was being imported. Where an extra is missing, that is one
+line too, and status 2. Only a program of this project, started as `python -m planner ...` or `seventh-axis ...`, is
+ended so; one that imports these packages as a library keeps its own signals and its exceptions.
 """
 
 import os
+import re
 import signal
 import sys
 from collections.abc import Sequence
-from types import FrameType
+from types import FrameType, TracebackType
 
-_PROGRAMS = ("emulator", "planner", "protocol", "tools")
+_SCRIPT = "seventh-axis"
+_PROGRAMS = ("emulator", "planner", "protocol", "seventh_axis", "tools", _SCRIPT)
 
 
-def module_run(command: Sequence[str]) -> str:
-    """Return the module that `python [OPTIONS] -m MODULE` runs, or nothing."""
+def program_run(command: Sequence[str]) -> str:
+    """Return the module that `python [OPTIONS] -m MODULE` runs, `seventh-axis` for that script, or nothing."""
     words = iter(command[1:])
     for word in words:
         if word == "-m":
@@ -22,18 +25,31 @@ def module_run(command: Sequence[str]) -> str:
         if word in {"-W", "-X"}:
             next(words, None)
         elif not word.startswith("-") or word == "-c":
-            break
+            return _SCRIPT if re.fullmatch(rf"(?:.*[/\\])?{_SCRIPT}(?:\.exe)?", word) else ""
     return ""
 
 
 def end_quietly(number: int, _: FrameType | None) -> None:
     """End the program at once: during the imports there is nothing to put away."""
-    os.write(2, f"{module_run(sys.orig_argv)}: interrupted\n".encode())
+    os.write(2, f"{_PROGRAM}: interrupted\n".encode())
     os._exit(128 + number)
 
 
-IS_PROGRAM = module_run(sys.orig_argv).partition(".")[0] in _PROGRAMS
+def end_without_extra(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
+    """End the program with one line where an import did not find a module of an extra; else print the traceback."""
+    from protocol.extras import missing_extra  # noqa: PLC0415  # seldom needed, and a start should be quick
+
+    if sentence := missing_extra(error, _PROGRAM, *sys.argv[1:2]):
+        sys.stderr.write(f"{_PROGRAM}: {sentence}\n")
+        raise SystemExit(2)
+    sys.__excepthook__(kind, error, traceback)
+
+
+_PROGRAM = program_run(sys.orig_argv)
+IS_PROGRAM = _PROGRAM.partition(".")[0] in _PROGRAMS
 """Whether this process is a program of this project, and no other that uses it."""
+if IS_PROGRAM:
+    sys.excepthook = end_without_extra
 # Ignored signals (nohup, `&` in a script) stay so.
 if IS_PROGRAM and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, end_quietly)

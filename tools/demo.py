@@ -13,6 +13,7 @@ from pathlib import Path
 
 from planner.__main__ import main as planner
 from protocol import TableError
+from protocol.command_line import Parser, program_name
 from tools.command_line import ended
 from tools.preemption import draw_preemption, stand_in
 
@@ -25,8 +26,8 @@ LEAD_S = 0.0035
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demonstration and return the exit status: 0 when the motion was verified."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tools.demo",
+    parser = Parser(
+        prog=program_name("tools.demo"),
         description="Plan a scan, stream it to a stand-in table on a pseudo-terminal, and verify the motion.",
         epilog="example: python -m tools.demo --out build/demo",
     )

@@ -4,6 +4,9 @@ Fig. 5 is the shape of Eq. (1), Fig. 6 a configuration map with a plan in both v
 Dijkstra's algorithm, Fig. 8 ray shooting at four moments and Fig. 9 its speed and acceleration.
 """
 
+import protocol.quiet_start  # noqa: F401 - before the imports that take long
+
+# isort: split
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -31,6 +34,7 @@ from planner.planning.problem import Problem
 from planner.planning.ray_shooting import Rays, cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
 from planner.table.cost import Weights
 from planner.table.motion import Limits, limited_acceleration, next_angle, next_speed
+from protocol.command_line import Parser, program_name
 from protocol.whole_file import whole_file
 from tools.command_line import ended
 
@@ -234,8 +238,8 @@ FIGURES: Mapping[str, Callable[[], Figure]] = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the figures asked for and print the files written."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tools.figures",
+    parser = Parser(
+        prog=program_name("tools.figures"),
         description="Reproduce Fig. 5 to 9 of the paper.",
         epilog="example: python -m tools.figures --out build/figures fig8",
     )

@@ -12,6 +12,7 @@ from pathlib import Path
 from emulator.config.table_config import load_config
 from emulator.config.toml_section import ConfigError
 from protocol.client import TableClient
+from protocol.command_line import Parser, program_name
 from protocol.errors import TableError
 from protocol.progress import share_shown
 from protocol.whole_file import write_whole
@@ -30,7 +31,7 @@ _NEEDED = ("gain", "time constant", "Coulomb friction")
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
-    options = _parser().parse_args(arguments)
+    options = parser().parse_args(arguments)
     return ended("identify", lambda: int(options.run(options)), ConfigError, RecordingError, TableError)
 
 
@@ -100,11 +101,12 @@ def _check_distinct(paths: list[Path]) -> None:
             )
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m tools.identify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+def parser() -> Parser:
+    """Return the parser of the command line."""
+    one = Parser(
+        prog=program_name("tools.identify"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    commands = parser.add_subparsers(required=True)
+    commands = one.add_subparsers(required=True)
     recorder = commands.add_parser(
         "record", help="move a table and record its answers (within a quarter of a turn, by default)"
     )
@@ -130,7 +132,7 @@ def _parser() -> argparse.ArgumentParser:
         "--config", type=Path, help="known constants: gains, encoder, datasheet (default: the default table)"
     )
     fitter.set_defaults(run=_fit)
-    return parser
+    return one
 
 
 if __name__ == "__main__":

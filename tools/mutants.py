@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 from emulator.table.fast_ticks import LOADED_TICKS
 from protocol.progress import share_shown
+from protocol.command_line import Parser, program_name
 from protocol.own_program import own_environment, own_program
 from tools.command_line import ended
 from tools.mutation import COMPILED, MODULES, Mutation, mutations_of, planted
@@ -117,8 +118,9 @@ def _run(options: argparse.Namespace) -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, and return the exit status: 1 if a mutant came through without a reason."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tools.mutants", description="random mutants of the emulated table that the suite does not catch"
+    parser = Parser(
+        prog=program_name("tools.mutants"),
+        description="random mutants of the emulated table that the suite does not catch",
     )
     parser.add_argument("--seed", type=int, default=0, help="random seed of the mutants and of the suite (default: 0)")
     parser.add_argument("--count", type=int, default=60, help="number of mutants, about 5 s each (default: 60)")

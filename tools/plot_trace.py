@@ -3,6 +3,9 @@
 From top to bottom: reference and measured speed with the commands that made them, position, and what the motor did.
 """
 
+import protocol.quiet_start  # noqa: F401 - before the imports that take long
+
+# isort: split
 import argparse
 import sys
 from math import inf
@@ -15,6 +18,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from emulator.trace import Trace, read_trace
+from protocol.command_line import Parser, program_name
 from protocol.data_file import did_you_mean
 from protocol.whole_file import whole_file
 from tools.command_line import ended
@@ -164,8 +168,14 @@ def _draw_panel(axes: Axes, panel: Panel, trace: Trace, rows: slice, signals: tu
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit status."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tools.plot_trace",
+    options = parser().parse_args(arguments)
+    return ended("plot_trace", lambda: _draw(options), ValueError)
+
+
+def parser() -> Parser:
+    """Return the parser of the command line."""
+    parser = Parser(
+        prog=program_name("tools.plot_trace"),
         description="Draw a trace that the emulator recorded.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -182,8 +192,7 @@ def main(arguments: list[str] | None = None) -> int:
         default=",".join(_DEFAULT_SIGNALS),
         help=f"columns to draw, of {', '.join(SIGNALS)} (default: all but true_deg)",
     )
-    options = parser.parse_args(arguments)
-    return ended("plot_trace", lambda: _draw(options), ValueError)
+    return parser
 
 
 def _draw(options: argparse.Namespace) -> int:

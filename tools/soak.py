@@ -19,6 +19,7 @@ from emulator.table.fast_ticks import FastTicks
 from emulator.table.table import Table
 from protocol.client import TableClient
 from protocol.codec import decode_reply
+from protocol.command_line import Parser, program_name
 from protocol.errors import TableError
 from protocol.messages import Angle, Ok, Refusal
 from protocol.own_program import own_environment, own_program
@@ -166,8 +167,8 @@ SOAKS: dict[str, tuple[Callable[[float, int], Soak], float, str]] = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the named soaks; return 1 when something did not hold."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tools.soak",
+    parser = Parser(
+        prog=program_name("tools.soak"),
         description="Run the stand-in for long, and look whether all that must hold still holds.",
         epilog="example: python -m tools.soak noise --share 0.01",
     )

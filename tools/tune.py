@@ -22,6 +22,7 @@ from pathlib import Path
 from emulator.config.table_config import load_config
 from emulator.config.toml_section import ConfigError
 from protocol.progress import share_shown
+from protocol.command_line import Parser, program_name
 from protocol.whole_file import whole_file
 from tools.command_line import check_folder, ended
 from tools.tuning.bounds import Limits
@@ -38,7 +39,7 @@ _TUNE_FOLDER, _JUDGE_FOLDER = Path("build/tune"), Path("build/judge")
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
-    options = _parser().parse_args(arguments)
+    options = parser().parse_args(arguments)
     return ended("tune", lambda: _tune(options), ConfigError, TuningError)
 
 
@@ -165,10 +166,11 @@ def _bounds(design: Design) -> str:
     return f"bounded by {', '.join(map(str, design.binding)) or 'nothing'}"
 
 
-def _parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
+    """Return the parser of the command line."""
     defaults = Limits()
-    parser = argparse.ArgumentParser(
-        prog="python -m tools.tune", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    parser = Parser(
+        prog=program_name("tools.tune"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--config", type=Path, help="TOML with the table's constants that differ from the default ones")
     parser.add_argument("--judge", type=Path, metavar="GAINS.toml", help="gains to judge, instead of a search")

@@ -15,6 +15,7 @@ from planner.defaults import (
     TOLERANCE_DEG,
     shipped_scans,
 )
+from protocol.command_line import Parser, program_name
 from protocol.number_options import number, positive_number, whole_number
 
 _Commands = "argparse._SubParsersAction[argparse.ArgumentParser]"
@@ -23,8 +24,8 @@ REPORT_FILE = "report.html"
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser; what it returns has the name of its command in `command`."""
-    top = argparse.ArgumentParser(
-        prog="python -m planner",
+    top: argparse.ArgumentParser = Parser(
+        prog=program_name("planner"),
         description="Plan the motion of a rotary table under a scanning robot arm.",
         epilog="example: python -m planner map mould --out build/mould",
     )

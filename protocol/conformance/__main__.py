@@ -4,9 +4,9 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from protocol.bench import BenchError
+from protocol.command_line import Parser, program_name
 from protocol.conformance.bench.ports import SessionError, open_port
 from protocol.conformance.cases.case import Case
 from protocol.conformance.cases.catalogue import chosen_cases
@@ -26,17 +26,10 @@ Exit status: 0 when no case failed, 1 when one did, 2 when the table could not b
 """
 
 
-class _Parser(argparse.ArgumentParser):
-    """An argument parser whose errors are one line."""
-
-    def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message} (--help shows all options)")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     try:
-        options = _parser().parse_args(arguments)
+        options = parser().parse_args(arguments)
         cases = _chosen(options.case)
         if options.list:
             return _list(cases)
@@ -62,15 +55,15 @@ def _on_the_table(options: argparse.Namespace, cases: Sequence[Case]) -> int:
         port.close()
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
-        prog="python -m protocol.conformance",
+def parser() -> Parser:
+    """Return the parser of the command line."""
+    one = Parser(
+        prog=program_name("protocol.conformance"),
         description="Hold a rotary table against the specification, clause by clause.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
     )
-    add = parser.add_argument
+    add = one.add_argument
     add("--port", metavar="URL", help="the table: a device, or any URL of pyserial's")
     add(
         "--profile",
@@ -92,7 +85,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--yes", action="store_true", help="the table may be moved as the profile says: do not ask")
     add("--list", action="store_true", help="show the cases and what each needs, and end")
     add("--replay", metavar="FILE", type=Path, help="send the wire of a record.json again, and show where answers part")
-    return parser
+    return one
 
 
 def _chosen(prefixes: Sequence[str]) -> list[Case]:

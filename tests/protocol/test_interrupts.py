@@ -6,7 +6,7 @@ import pytest
 
 from protocol import interrupts
 from protocol.interrupts import ended_by_signals, said, signals_wait, status_after
-from protocol.quiet_start import module_run
+from protocol.quiet_start import program_run
 
 
 def test_an_interrupt_waits_until_the_block_is_done() -> None:
@@ -122,7 +122,11 @@ def test_the_notes_of_an_error_are_told_with_it() -> None:
         (["python", "-c", "pass", "-m", "planner"], ""),
         (["python", "script.py", "-m", "planner"], ""),
         (["python"], ""),
+        (["python", "/home/me/bin/seventh-axis", "plan"], "seventh-axis"),
+        (["python.exe", r"C:\bin\seventh-axis.exe", "plan"], "seventh-axis"),
+        (["python", "emulator.py"], ""),
+        (["python", "tools"], ""),
     ],
 )
-def test_only_a_module_that_python_runs_is_ended_quietly(command: list[str], module: str) -> None:
-    assert module_run(command) == module
+def test_only_a_program_of_this_project_is_ended_quietly(command: list[str], module: str) -> None:
+    assert program_run(command) == module

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 
+from protocol.command_line import Parser, program_name
 from tools.command_line import ended
 
 SUBJECTS = ("calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream")
@@ -31,9 +32,9 @@ def _run(options: argparse.Namespace, benches: Mapping[str, Callable[..., None]]
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m tools.bench",
+def _parser() -> Parser:
+    parser = Parser(
+        prog=program_name("tools.bench"),
         description="Measure this machine's figures, each beside a peer or the truth.",
         epilog="examples:\n  python -m tools.bench emulator map\n  python -m tools.bench identify --pty",
         formatter_class=argparse.RawDescriptionHelpFormatter,
