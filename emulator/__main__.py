@@ -130,7 +130,8 @@ def _seed(text: str) -> int:
 def _serve(options: argparse.Namespace, config: TableConfig, stack: ExitStack) -> None:
     """Open what was asked for, publish the ports, and serve; `stack` closes all of it in the reverse order."""
     signals = stack.enter_context(SignalWatch(*SERVED_SIGNALS))
-    table = Table(config, seed=options.seed)
+    with _usage("--config"):
+        table = Table(config, seed=options.seed)
     with _usage("--trigger-hz"):
         table.trigger_hz = options.trigger_hz
     ports = _open_ports(options, config, stack)

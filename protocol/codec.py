@@ -8,12 +8,12 @@ import re
 from decimal import ROUND_HALF_EVEN, Context, Decimal, InvalidOperation
 
 from protocol.errors import ProtocolMisuse, UnexpectedReply
-from protocol.messages import LINE_LIMIT, VERBS, Angle, Command, ErrorCode, Ok, Refusal, Reply, Verb
+from protocol.messages import ANGLE_LETTERS, LINE_LIMIT, VERBS, Angle, Command, ErrorCode, Ok, Refusal, Reply, Verb
 
 MAX_DECIMALS = 6
 
 _NUMBER = re.compile(rb"[+-]?[0-9]+(?:\.[0-9]+)?")
-_ANGLE = re.compile(rb"([HL]) (-?[0-9]+\.[0-9]+)")
+_ANGLE = re.compile(rf"([{ANGLE_LETTERS}]) (-?[0-9]+\.[0-9]+)".encode())
 _REFUSAL = re.compile(rb"ERR ([1-5])(?: .*)?")
 _VERB_OF_LETTER = {verb.encode(): verb for verb in Verb}
 _EXACT = Context(prec=LINE_LIMIT, rounding=ROUND_HALF_EVEN, traps=[InvalidOperation])

@@ -95,3 +95,6 @@ VERBS: Mapping[Verb, VerbEntry] = MappingProxyType(
     }
 )
 """Table 1 of the paper, in its order."""
+
+ANGLE_LETTERS = "".join(verb for verb, entry in VERBS.items() if entry.reply is Angle)
+"""The letters that begin a reply with an angle."""

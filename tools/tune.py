@@ -98,7 +98,7 @@ def _command_line(options: argparse.Namespace, limits: Limits) -> str:
         if bound != usual:
             words += bound.option.split()
     for name in ("plants", "spread", "seed"):
-        if (value := getattr(options, name)) != _parser().get_default(name):
+        if (value := getattr(options, name)) != parser().get_default(name):
             words += [f"--{name}", f"{value:g}"]
     return shlex.join(words)
 

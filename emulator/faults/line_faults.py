@@ -5,6 +5,10 @@ from collections import deque
 from emulator.faults.fault import Drop, Flip, HalfReply, LateReplies, LateReply, Silence, WrongBaud
 from emulator.faults.schedule import FaultSchedule
 from emulator.line.framing import read_at_rate
+from protocol.bench import Fault
+
+LINE_KINDS: frozenset[type[Fault]] = frozenset((Drop, Flip, LateReplies, HalfReply, LateReply, Silence, WrongBaud))
+"""The faults that this module gives their effect."""
 
 TO_TABLE, TO_CLIENT = 1, -1
 """The direction of bytes, as a fault's parameter `direction` names it; there 0 is both."""

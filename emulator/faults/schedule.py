@@ -4,12 +4,15 @@ What a fault does while it holds is in `line_faults`, `drive_faults` and `trigge
 and is seeded: the same faults strike the same bytes at the same ticks.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from random import Random
 from typing import NamedTuple, TypeVar
 
-from emulator.faults.fault import STRIKES_ONCE, FaultError, HangUp
+from emulator.faults.fault import KINDS, STRIKES_ONCE, FaultError, HangUp
 from protocol.bench import Fault
+
+PORT_KINDS: frozenset[type[Fault]] = frozenset((HangUp,))
+"""The faults that this module gives their effect: `FaultSchedule.hangs_up`."""
 
 MOST_PLANS = 1000
 """Faults that may wait at once: each is looked at whenever one begins."""
@@ -40,8 +43,21 @@ class FaultSchedule:
         chance: where the faults' effects draw from.
     """
 
-    def __init__(self, faults: Iterable[Fault], tick_hz: int, seed: int) -> None:
-        """Take the faults of a configuration; one without a beginning holds from the start."""
+    def __init__(
+        self, faults: Iterable[Fault], tick_hz: int, seed: int, effective: Collection[type[Fault]] = KINDS.values()
+    ) -> None:
+        """Take the faults of a configuration; one without a beginning holds from the start.
+
+        Args:
+            faults: of the configuration.
+            tick_hz: ticks in a simulated second.
+            seed: of the chance in what faults do.
+            effective: the kinds that have an effect on the table.
+
+        Raises:
+            FaultError: see `inject`.
+        """
+        self._effective = effective
         self.chance = Random(f"faults {seed}")  # noqa: S311  # no secret
         self._tick_hz = tick_hz
         self._plans: list[Plan] = []
@@ -73,8 +89,11 @@ class FaultSchedule:
             Whether the port goes away with this, as after `begin_tick` and `begin_line`.
 
         Raises:
-            FaultError: too many wait already.
+            FaultError: it has no effect on this table, or too many wait already.
         """
+        if type(fault) not in self._effective:
+            effective = ", ".join(sorted(kind.kind for kind in self._effective))
+            raise FaultError(f"{fault.kind} has no effect on this table; those that have are {effective}")
         if len(self._plans) >= MOST_PLANS:
             raise FaultError(f"{MOST_PLANS} faults wait for their beginning; no more are taken until some have begun")
         begin = None if fault.at_command is not None else tick

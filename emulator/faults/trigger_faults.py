@@ -4,6 +4,10 @@ import math
 
 from emulator.faults.fault import BouncedTrigger, MissedTrigger
 from emulator.faults.schedule import FaultSchedule
+from protocol.bench import Fault
+
+TRIGGER_KINDS: frozenset[type[Fault]] = frozenset((MissedTrigger, BouncedTrigger))
+"""The faults that this module gives their effect."""
 
 
 class TriggerFaults:

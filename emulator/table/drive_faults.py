@@ -22,16 +22,17 @@ from emulator.plant.friction import Friction
 from emulator.table.tick import TableConstants, TableState
 from protocol.bench import Fault
 
-_KINDS: frozenset[type[Fault]] = frozenset(
+DRIVE_KINDS: frozenset[type[Fault]] = frozenset(
     (Stall, ExtraLoad, SupplySag, StuckPwm, OneSided, LostCounts, SwappedEncoder, DeadEncoder)
 )
+"""The faults that this module gives their effect."""
 _HELD_OVER_STALL = 4.0
 """What holds a stalled table, over the motor's own stall torque."""
 
 
 def is_faulty(faults: FaultSchedule) -> bool:
     """Return whether a tick of plant and controller is another than that of a sound table."""
-    return faults.holds_any(_KINDS)
+    return faults.holds_any(DRIVE_KINDS)
 
 
 def faulty_step(

@@ -1,5 +1,6 @@
-"""The command interpreter: what each of the six verbs does to the controller, and what it answers."""
+"""The command interpreter: what each verb of Table 1 does to the controller, and what it answers."""
 
+from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
 from typing import NamedTuple
@@ -18,6 +19,10 @@ class Registers(NamedTuple):
     speed: int  # count/tick, the table's motion bits
     acceleration: int  # count/tick^2, the table's motion bits
     latched_count: int
+
+
+Outcome = tuple[Reply, FirmwareState, Registers]
+"""The reply to a command, and controller and registers after it."""
 
 
 class Interpreter:
@@ -43,47 +48,51 @@ class Interpreter:
         angle = count / self._count_deg
         return (Decimal(angle.numerator) / angle.denominator).quantize(Decimal("1e-10"))
 
-    def execute(
-        self, command: Command, controller: FirmwareState, registers: Registers
-    ) -> tuple[Reply, FirmwareState, Registers]:
-        """Return the reply, and controller and registers after the command; a refused one changes nothing."""
-        verb = command.verb
-        if verb is Verb.READ_POSITION:
-            return Angle(verb, self.angle_deg(controller.counts[-1])), controller, registers
-        if verb is Verb.READ_LATCH:
-            return Angle(verb, self.angle_deg(registers.latched_count)), controller, registers
-        assert command.value is not None  # the codec gives the other verbs their number
-        value = Fraction(command.value)
-        if verb is Verb.SET_SPEED:
-            return self._set_speed(value, controller, registers)
-        if verb is Verb.SET_ACCELERATION:
-            return self._set_acceleration(value, controller, registers)
-        return self._move(verb, value, controller, registers)
+    def execute(self, command: Command, controller: FirmwareState, registers: Registers) -> Outcome:
+        """Return the reply, and controller and registers after the command; a refused one changes nothing.
 
-    def _set_speed(
-        self, value: Fraction, controller: FirmwareState, registers: Registers
-    ) -> tuple[Reply, FirmwareState, Registers]:
+        A verb that `CARRIED_OUT` does not have is refused as unknown.
+        """
+        if command.verb not in CARRIED_OUT:
+            return Refusal(ErrorCode.UNKNOWN_COMMAND), controller, registers
+        return CARRIED_OUT[command.verb](self, command, controller, registers)
+
+    def read_position(self, command: Command, controller: FirmwareState, registers: Registers) -> Outcome:
+        """H: the angle of the encoder's last count."""
+        return Angle(command.verb, self.angle_deg(controller.counts[-1])), controller, registers
+
+    def read_latch(self, command: Command, controller: FirmwareState, registers: Registers) -> Outcome:
+        """L: the angle of the count that the trigger latched."""
+        return Angle(command.verb, self.angle_deg(registers.latched_count)), controller, registers
+
+    def move_to(self, command: Command, controller: FirmwareState, registers: Registers) -> Outcome:
+        """P: begin a motion to a position that the counter can hold."""
+        target = to_fixed(_value(command) * self._count_deg, self._bits)
+        if not -self._half_range <= target <= self._last_position:
+            return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
+        return self._move(distance_to(controller.reference, target, self._bits), controller, registers)
+
+    def move_by(self, command: Command, controller: FirmwareState, registers: Registers) -> Outcome:
+        """R: begin a motion by an increment."""
+        return self._move(to_fixed(_value(command) * self._count_deg, self._bits), controller, registers)
+
+    def set_speed(self, command: Command, controller: FirmwareState, registers: Registers) -> Outcome:
+        """S: the top speed of the next motion."""
+        value = _value(command)
         speed = self._speed(value)
         if speed < 1 or value > self._limits.speed_deg_s:
             return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
         return Ok(), controller, registers._replace(speed=speed)
 
-    def _set_acceleration(
-        self, value: Fraction, controller: FirmwareState, registers: Registers
-    ) -> tuple[Reply, FirmwareState, Registers]:
+    def set_acceleration(self, command: Command, controller: FirmwareState, registers: Registers) -> Outcome:
+        """A: the acceleration of the next motion."""
+        value = _value(command)
         acceleration = self._acceleration(value)
         if acceleration < 1 or value > self._limits.acceleration_deg_s2:
             return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
         return Ok(), controller, registers._replace(acceleration=acceleration)
 
-    def _move(
-        self, verb: Verb, value: Fraction, controller: FirmwareState, registers: Registers
-    ) -> tuple[Reply, FirmwareState, Registers]:
-        distance = target = to_fixed(value * self._count_deg, self._bits)
-        if verb is Verb.MOVE_TO:
-            distance = distance_to(controller.reference, target, self._bits)
-            if not -self._half_range <= target <= self._last_position:
-                return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
+    def _move(self, distance: int, controller: FirmwareState, registers: Registers) -> Outcome:
         if abs(distance) > self._half_range:
             return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
         profile = Profile.of(registers.speed, registers.acceleration)
@@ -94,3 +103,19 @@ class Interpreter:
 
     def _acceleration(self, acceleration_deg_s2: Fraction) -> int:
         return to_fixed(acceleration_deg_s2 * self._count_deg / self._tick_hz**2, self._bits)
+
+
+def _value(command: Command) -> Fraction:
+    assert command.value is not None, command  # the codec gives a verb its number where it takes one
+    return Fraction(command.value)
+
+
+CARRIED_OUT: dict[Verb, Callable[[Interpreter, Command, FirmwareState, Registers], Outcome]] = {
+    Verb.READ_POSITION: Interpreter.read_position,
+    Verb.READ_LATCH: Interpreter.read_latch,
+    Verb.MOVE_TO: Interpreter.move_to,
+    Verb.MOVE_BY: Interpreter.move_by,
+    Verb.SET_SPEED: Interpreter.set_speed,
+    Verb.SET_ACCELERATION: Interpreter.set_acceleration,
+}
+"""What the table does on each verb; a test keeps it complete."""

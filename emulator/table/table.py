@@ -7,13 +7,15 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from emulator.config.table_config import TableConfig
-from emulator.faults.schedule import FaultSchedule
+from emulator.faults.line_faults import LINE_KINDS
+from emulator.faults.schedule import PORT_KINDS, FaultSchedule
+from emulator.faults.trigger_faults import TRIGGER_KINDS
 from emulator.firmware.profiler import Profile
 from emulator.int32 import wrap_int32
 from emulator.plant.drive_train import DriveState, at_standstill
 from emulator.plant.encoder import angle_within_tick, count_at, recounted
 from emulator.table.control_loop import ControlLoop
-from emulator.table.drive_faults import is_faulty
+from emulator.table.drive_faults import DRIVE_KINDS, is_faulty
 from emulator.table.fast_ticks import Run
 from emulator.table.interpreter import Interpreter, Registers
 from emulator.table.serial_end import SerialEnd
@@ -23,6 +25,8 @@ from emulator.table.trigger import TriggerInput
 from protocol.bench import Fault, Observer, TableStatus
 from protocol.codec import decode_command, encode_reply
 from protocol.messages import Command, ErrorCode, Refusal
+
+_EFFECTIVE_FAULTS = LINE_KINDS | PORT_KINDS | DRIVE_KINDS | TRIGGER_KINDS
 
 
 class Snapshot(NamedTuple):
@@ -73,7 +77,7 @@ class Table:
         drive = at_standstill(constants.drive, gap_share=chance.uniform(-1.0, 1.0))
         self._loop = ControlLoop(constants, self._woken(constants, drive), run=run)
         self._true_zero_rad = 0.0
-        self._faults = FaultSchedule(config.faults, tick_hz, seed)
+        self._faults = FaultSchedule(config.faults, tick_hz, seed, _EFFECTIVE_FAULTS)
         self._serial = SerialEnd(config, self._faults)
         self._triggers = TriggerInput(tick_hz, self._faults)
 

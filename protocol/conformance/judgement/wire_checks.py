@@ -8,7 +8,7 @@ from decimal import Decimal
 from protocol.conformance.bench.wire import CR, Line, Wire
 from protocol.conformance.judgement.verdict import NonconformityError, require
 from protocol.conformance.profile.profile import Profile
-from protocol.messages import ErrorCode
+from protocol.messages import ANGLE_LETTERS, ErrorCode
 
 QUIET_S = 0.05
 """What must stay silent is listened to for this long, and the latency."""
@@ -24,7 +24,7 @@ _SHOWN = 40
 _STAND_STILL_S = 0.15
 """At 10 deg/s2 a table makes 0.11 deg in it."""
 
-_ANGLE = re.compile(rb"([HL]) (-?(?:0|[1-9][0-9]*)\.([0-9]+))")
+_ANGLE = re.compile(rf"([{ANGLE_LETTERS}]) (-?(?:0|[1-9][0-9]*)\.([0-9]+))".encode())
 
 
 class WireChecks:

@@ -9,8 +9,9 @@ from protocol.conformance.bench.stand import Stand
 from protocol.conformance.bench.wire import CR, Event, Wire
 from protocol.conformance.profile.profile import Profile
 from protocol.conformance.results.record import RecordedCase
+from protocol.messages import ANGLE_LETTERS
 
-_ANGLE = re.compile(rb"([HL]) (-?[0-9]+\.[0-9]+)")
+_ANGLE = re.compile(rf"([{ANGLE_LETTERS}]) (-?[0-9]+\.[0-9]+)".encode())
 AFTER_S = 0.3
 """From the last event of a case until the next case begins."""
 _MOMENT_S = 0.001

@@ -2,14 +2,20 @@
 
 import json
 import math
+import re
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 from emulator.config.table_config import load_config
 from emulator.config.toml_section import ConfigError
+from emulator.faults import fault
 from emulator.faults.fault import KINDS, FaultError, fault_from, parameters_of
 from emulator.server.control_commands import COMMANDS
+from emulator.table.table import Table
+from protocol.bench import Fault, TableStatus
 from tests.emulator.quiet_stand import QuietStand
 
 EXAMPLE: dict[str, dict[str, float]] = {
@@ -82,6 +88,58 @@ def test_what_is_no_fault_is_refused_in_one_line(
     )
     with pytest.raises(ConfigError, match=f"faulty.toml: faults: {words}"):
         load_config(file)
+
+
+class Seen(NamedTuple):
+    """What a client and the state of the table show of a short session."""
+
+    hung_up: bool
+    replies: list[bytes]
+    states: list[TableStatus]
+
+
+def session_with(*faults: Fault) -> Seen:
+    table = Table(load_config(), seed=1)
+    for one in faults:
+        table.inject(one)
+    seen = Seen(table.hung_up, [], [])
+    for line in (b"H\r", b"S 40\r", b"A 100\r", b"P 8\r", b"L\r", b"P -4\r", b"L\r", b"H\r"):
+        table.receive(line)
+        table.advance(50)
+        table.trigger()
+        for _ in range(4):
+            seen.replies.append(table.transmit())
+            table.advance(50)
+        seen.states.append(table.status())
+    return seen
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_fault_has_an_effect(kind: str) -> None:
+    assert session_with() == session_with()
+    assert session_with(fault_from(kind, EXAMPLE[kind])) != session_with()
+
+
+class Gremlins(Fault, kind="gremlins"):
+    """Nothing goes wrong."""
+
+
+def test_a_fault_without_effect_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fault, "KINDS", {**KINDS, Gremlins.kind: Gremlins})
+    with pytest.raises(FaultError, match=r"gremlins has no effect on this table; those that have are \w+"):
+        session_with(fault_from("gremlins", {}))
+    with pytest.raises(FaultError, match="gremlins has no effect"):
+        Table(replace(load_config(), faults=(fault_from("gremlins", {}),)))
+
+
+def test_every_fault_has_its_row_in_the_docs() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "faults.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `([a-z-]+)` \| ([^|]*)\|", page, re.MULTILINE))
+    assert rows.keys() == KINDS.keys()
+    for kind, numbers in rows.items():
+        assert re.findall(r"`(\w+)`", numbers) == [
+            parameter.name for parameter in parameters_of(kind) if parameter.name not in {"at_s", "at_command", "for_s"}
+        ], kind
 
 
 def test_help_and_parameters_agree() -> None:

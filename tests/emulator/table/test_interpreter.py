@@ -13,8 +13,8 @@ from emulator.config.table_config import load_config
 from emulator.firmware.controller import MOVING, FirmwareState, power_on
 from emulator.firmware.profiler import Profile, Reference
 from emulator.int32 import INT32_MAX
-from emulator.table.interpreter import Interpreter, Registers
-from protocol.messages import Angle, Command, ErrorCode, Ok, Refusal, Reply, Verb
+from emulator.table.interpreter import CARRIED_OUT, Interpreter, Registers
+from protocol.messages import VERBS, Angle, Command, ErrorCode, Ok, Refusal, Reply, Verb
 
 CONFIG = load_config()
 INTERPRETER = Interpreter(CONFIG)
@@ -33,6 +33,16 @@ def execute(
 ) -> tuple[Reply, FirmwareState, Registers]:
     number = None if value is None else Decimal(value)
     return INTERPRETER.execute(Command(verb, number), state or controller(), registers)
+
+
+def test_every_verb_of_table_1_is_carried_out() -> None:
+    assert CARRIED_OUT.keys() == VERBS.keys() == set(Verb)
+
+
+def test_a_verb_that_the_table_does_not_carry_out_is_refused_as_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(CARRIED_OUT, Verb.READ_LATCH)
+    state = controller()
+    assert execute(Verb.READ_LATCH, None, state) == (Refusal(ErrorCode.UNKNOWN_COMMAND), state, REGISTERS)
 
 
 def distance(state: FirmwareState) -> int:
