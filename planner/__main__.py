@@ -8,6 +8,7 @@ from importlib import import_module
 from planner.commands.command_line import parser
 from planner.errors import PlannerError
 from planner.kinematics.configuration import Configuration
+from protocol.command_line import program_name, short_name
 from protocol.interrupts import ended_by_signals, said, status_after
 
 _BAD_INPUT = 2
@@ -24,15 +25,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _status_of(chosen: argparse.Namespace) -> int:
+    name = short_name(f"{program_name('planner')} {chosen.command}")
     try:
         if getattr(chosen, "configuration", "all") not in {"all", "best"}:
             Configuration.parse(chosen.configuration)  # a misspelt name is refused before what takes long is loaded
         return int(import_module(f"planner.commands.{chosen.command}").run(chosen))
     except PlannerError as error:
-        print(error, file=sys.stderr)
+        print(f"{name}: {error}", file=sys.stderr)
         return _BAD_INPUT
     except KeyboardInterrupt as interrupt:
-        print(f"\n{said(interrupt, 'interrupted')}; nothing more was written", file=sys.stderr)
+        print(f"\n{name}: {said(interrupt, 'interrupted')}; nothing more was written", file=sys.stderr)
         return status_after(interrupt)
 
 

@@ -134,7 +134,7 @@ def test_an_arm_that_cannot_follow_is_refused_in_one_line_and_nothing_moves(
     assert main(["run", str(plan_file), *arguments]) == 2
     shown = capsys.readouterr()
     assert sentence in shown.err
-    assert shown.err.startswith(str(plan_file))
+    assert shown.err.startswith(f"planner run: {plan_file}")
     assert shown.err.count("\n") == 1
     assert shown.out == ""
     assert not (tmp_path / "run").exists()
