@@ -21,12 +21,18 @@ def project(folder: Path, files: Mapping[str, str]) -> Path:
     return folder
 
 
-def run_pytest(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    """Run pytest as the project would: the plug-in is found by its entry point, the folder is on the path."""
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:hypothesispytest"]
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+PYTEST = [str(Path(sys.executable).with_name("pytest"))]
+AS_A_MODULE = [sys.executable, "-m", "pytest"]
+
+
+def run_pytest(
+    folder: Path, *words: str, start: list[str] = PYTEST, path: str = ""
+) -> subprocess.CompletedProcess[str]:
+    """Run pytest as the project would: the plug-in is found by its entry point."""
+    command = [*start, "-q", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", *words]
+    environment = os.environ | {"PYTHONPATH": path}
     return subprocess.run(
-        [*command, *words], cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=120
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=120
     )
 
 
@@ -44,8 +50,10 @@ def run_pytest(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 def test_a_project_with_a_package_of_the_same_name_tests_its_own(files: Mapping[str, str], tmp_path: Path) -> None:
     name = next(iter(files)).partition("/")[0].removesuffix(".py")
     test = f"import {name}\n\ndef test_it_is_mine():\n    assert {name}.NAME == 'mine'\n"
-    result = run_pytest(project(tmp_path, {**files, "test_mine.py": test}), "-W", "error")
-    assert "1 passed" in result.stdout, result.stdout + result.stderr
+    folder = project(tmp_path, {**files, "test_mine.py": test})
+    for start in (PYTEST, AS_A_MODULE):
+        result = run_pytest(folder, "-W", "error", start=start)
+        assert "1 passed" in result.stdout, result.stdout + result.stderr
 
 
 def test_a_namespace_folder_tools_is_imported_beside_ours(tmp_path: Path) -> None:
@@ -59,10 +67,11 @@ def test_a_namespace_folder_tools_is_imported_beside_ours(tmp_path: Path) -> Non
 
 
 @pytest.mark.realtime
-def test_the_pty_table_is_ours_though_the_project_has_an_emulator(tmp_path: Path) -> None:
+@pytest.mark.parametrize("is_on_the_path", [False, True])
+def test_the_pty_table_is_ours_though_the_project_has_an_emulator(tmp_path: Path, *, is_on_the_path: bool) -> None:
     own = "import pathlib\npathlib.Path('was-run').touch()\n"
     folder = project(tmp_path, {"emulator.py": own, "test_mine.py": USES_THE_FIXTURE})
-    result = run_pytest(folder, "--table-port", "pty")
+    result = run_pytest(folder, "--table-port", "pty", path=str(folder) if is_on_the_path else "")
     assert "1 passed" in result.stdout, result.stdout + result.stderr
     assert not (folder / "was-run").exists()
 
