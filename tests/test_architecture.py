@@ -199,6 +199,12 @@ def test_what_is_installed_at_the_top_level_imports_nothing_of_ours_before_it_is
         assert not MAY_IMPORT.keys() & {name.partition(".")[0] for name in names}, source
 
 
+def test_every_command_line_is_read_by_the_one_parser() -> None:
+    for package in MAY_IMPORT:
+        for source in (ROOT / package).rglob("*.py"):
+            assert "argparse.ArgumentParser(" not in source.read_text(encoding="utf-8"), source
+
+
 def test_a_program_of_ours_is_started_so_that_nothing_shadows_it() -> None:
     for package in MAY_IMPORT:
         for source in (ROOT / package).rglob("*.py"):

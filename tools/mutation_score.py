@@ -22,6 +22,7 @@ from random import Random
 from typing import Final, NamedTuple
 
 from protocol.progress import share_shown
+from protocol.command_line import Parser, program_name
 from tools.command_line import ended
 from tools.mutation import Mutation, mutated_source, mutations_of
 
@@ -175,8 +176,8 @@ def _run(options: argparse.Namespace) -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, and return the exit status: 1 if fewer mutants are killed than wanted."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tools.mutation_score",
+    parser = Parser(
+        prog=program_name("tools.mutation_score"),
         description="random mutants of firmware, plant, line and planner that the tests do not kill",
         epilog="example: python -m tools.mutation_score --seed 1 --count 40",
     )
