@@ -6,7 +6,6 @@ ended so; one that imports these packages as a library keeps its own signals and
 """
 
 import os
-import re
 import signal
 import sys
 from collections.abc import Sequence
@@ -25,7 +24,8 @@ def program_run(command: Sequence[str]) -> str:
         if word in {"-W", "-X"}:
             next(words, None)
         elif not word.startswith("-") or word == "-c":
-            return _SCRIPT if re.fullmatch(rf"(?:.*[/\\])?{_SCRIPT}(?:\.exe)?", word) else ""
+            file = word.replace("\\", "/").rpartition("/")[2].removesuffix(".exe")
+            return _SCRIPT if file == _SCRIPT else ""
     return ""
 
 

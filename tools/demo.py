@@ -5,6 +5,9 @@ proves from what came back that the motion was the planned one, and names the pa
 `python -m tools.demo preemption --out DIR` draws Fig. 4 of the paper instead.
 """
 
+import protocol.quiet_start  # noqa: F401 - before the imports that take long
+
+# isort: split
 import argparse
 import sys
 import tempfile

@@ -4,6 +4,9 @@ python -m tools.identify record --port emulator:// --out trace.csv
 python -m tools.identify fit trace.csv --out table.toml
 """
 
+import protocol.quiet_start  # noqa: F401 - before the imports that take long
+
+# isort: split
 import argparse
 import sys
 from math import inf

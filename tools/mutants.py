@@ -5,6 +5,9 @@ at a time, in memory, and runs the suite against that table until a case fails. 
 may pass are listed with the reason in `mutants.toml`.
 """
 
+import protocol.quiet_start  # noqa: F401 - before the imports that take long
+
+# isort: split
 import argparse
 import json
 import resource

@@ -5,6 +5,9 @@ in a copy of the tree. It runs the tests that mirror the module, then those of t
 survive, and the share that was killed. A mutant that may survive is listed with its reason in `mutation_score.toml`.
 """
 
+import protocol.quiet_start  # noqa: F401 - before the imports that take long
+
+# isort: split
 import argparse
 import os
 import shutil

@@ -3,6 +3,9 @@
 A soak is small in the tests and full here; both run these functions.
 """
 
+import protocol.quiet_start  # noqa: F401 - before the imports that take long
+
+# isort: split
 import argparse
 import resource
 import subprocess

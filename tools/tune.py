@@ -12,6 +12,9 @@ Its [gains.ramp] and [gains.hold] have proportional_duty_s_deg, integral_time_s 
 is 0 if all bounds hold, 1 if not, and 2 for an input that cannot be used.
 """
 
+import protocol.quiet_start  # noqa: F401 - before the imports that take long
+
+# isort: split
 import argparse
 import shlex
 import sys

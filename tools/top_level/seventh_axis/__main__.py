@@ -5,7 +5,6 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, NamedTuple
 
 from seventh_axis.home import HOME, hidden
@@ -106,6 +105,8 @@ def _versions() -> str:
 
 
 def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version  # noqa: PLC0415  # most commands do not need it
+
     try:
         return version("seventh-axis")
     except PackageNotFoundError:
