@@ -72,13 +72,13 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
 
 def parser() -> Parser:
     """Return the parser of the command line."""
-    one = Parser(
+    parser = Parser(
         prog=program_name("emulator"),
         description="A stand-in rotary table behind a virtual serial port.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    add = one.add_argument
+    add = parser.add_argument
     add("--pty", action="store_true", help="open a pseudo-terminal and print its device")
     add("--link", metavar="PATH", type=Path, help="a symbolic link to the pseudo-terminal, removed at the end")
     add("--tcp", metavar="[HOST:]PORT", type=_address, help="listen on TCP and print the URL; port 0 is any free one")
@@ -92,7 +92,7 @@ def parser() -> Parser:
     add("--control", metavar="PATH", type=Path, help="a Unix socket for python -m emulator.control_client")
     add("--trace", metavar="FILE", type=Path, help="record every tick in a .csv or .npz file")
     add("--seed", metavar="N", type=_seed, default=0, help="seed of all that is left to chance (default 0)")
-    return one
+    return parser
 
 
 def _address(text: str) -> tuple[str, int]:

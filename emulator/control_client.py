@@ -36,20 +36,20 @@ def main(arguments: list[str] | None = None) -> int:
 
 def parser() -> Parser:
     """Return the parser of the command line."""
-    one = Parser(
+    parser = Parser(
         prog=program_name("emulator.control_client"),
         description="Act on a running stand-in apart from the wire.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    one.add_argument("path", metavar="PATH", type=Path, help="the socket that the stand-in was given with --control")
-    commands = one.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    parser.add_argument("path", metavar="PATH", type=Path, help="the socket that the stand-in was given with --control")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, command in COMMANDS.items():
         subparser = commands.add_parser(name, help=command.help, description=command.help)
         for parameter in command.parameters:
             flag = "--" + parameter.name.replace("_", "-") if parameter.optional else parameter.name
             subparser.add_argument(flag, type=float, help=parameter.help)
-    return one
+    return parser
 
 
 if __name__ == "__main__":

@@ -106,10 +106,10 @@ def _check_distinct(paths: list[Path]) -> None:
 
 def parser() -> Parser:
     """Return the parser of the command line."""
-    one = Parser(
+    parser = Parser(
         prog=program_name("tools.identify"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    commands = one.add_subparsers(required=True)
+    commands = parser.add_subparsers(required=True)
     recorder = commands.add_parser(
         "record", help="move a table and record its answers (within a quarter of a turn, by default)"
     )
@@ -135,7 +135,7 @@ def parser() -> Parser:
         "--config", type=Path, help="known constants: gains, encoder, datasheet (default: the default table)"
     )
     fitter.set_defaults(run=_fit)
-    return one
+    return parser
 
 
 if __name__ == "__main__":

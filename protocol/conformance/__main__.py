@@ -57,13 +57,13 @@ def _on_the_table(options: argparse.Namespace, cases: Sequence[Case]) -> int:
 
 def parser() -> Parser:
     """Return the parser of the command line."""
-    one = Parser(
+    parser = Parser(
         prog=program_name("protocol.conformance"),
         description="Hold a rotary table against the specification, clause by clause.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    add = one.add_argument
+    add = parser.add_argument
     add("--port", metavar="URL", help="the table: a device, or any URL of pyserial's")
     add(
         "--profile",
@@ -85,7 +85,7 @@ def parser() -> Parser:
     add("--yes", action="store_true", help="the table may be moved as the profile says: do not ask")
     add("--list", action="store_true", help="show the cases and what each needs, and end")
     add("--replay", metavar="FILE", type=Path, help="send the wire of a record.json again, and show where answers part")
-    return one
+    return parser
 
 
 def _chosen(prefixes: Sequence[str]) -> list[Case]:
