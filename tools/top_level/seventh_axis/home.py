@@ -5,14 +5,14 @@ from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 
 _ABOVE = Path(__file__).resolve().parents
-HOME = next(folder for folder in (_ABOVE[1], _ABOVE[3]) if (folder / "protocol" / "py.typed").is_file())
+HOME = next((folder for folder in _ABOVE[1:4] if (folder / "protocol" / "py.typed").is_file()), _ABOVE[1])
 """The folder of the packages: beside this one where it is installed, three folders up in a clone."""
 
 
 def hidden(package: str) -> str:
     """Return in one sentence what hides a package of this project from an import; empty where nothing does."""
     loaded = sys.modules.get(package)
-    found = PathFinder.find_spec(package) if loaded is None else loaded.__spec__
+    found = PathFinder.find_spec(package) if loaded is None else getattr(loaded, "__spec__", None)
     places = _places(found)
     if HOME / package in places:
         return ""
