@@ -10,6 +10,7 @@ COMMAND = "seventh-axis"
 """The installed command that leads to all programs."""
 
 _names: list[str] = []
+"""What this process was started as, once `run_as` has been told; a process runs one program."""
 
 
 def run_as(name: str) -> None:
