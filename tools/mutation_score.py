@@ -24,8 +24,8 @@ from queue import SimpleQueue
 from random import Random
 from typing import Final, NamedTuple
 
-from protocol.progress import share_shown
 from protocol.command_line import Parser, program_name
+from protocol.progress import share_shown
 from tools.command_line import ended
 from tools.mutation import Mutation, mutated_source, mutations_of
 

@@ -24,8 +24,8 @@ from pathlib import Path
 
 from emulator.config.table_config import load_config
 from emulator.config.toml_section import ConfigError
-from protocol.progress import share_shown
 from protocol.command_line import Parser, program_name
+from protocol.progress import share_shown
 from protocol.whole_file import whole_file
 from tools.command_line import check_folder, ended
 from tools.tuning.bounds import Limits

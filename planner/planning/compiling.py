@@ -5,7 +5,6 @@ take about the same time, and numba compiles one after the other in a process.
 """
 
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -22,6 +21,7 @@ from planner.planning.plan import Plan
 from planner.planning.scan_problem import scan_problem
 from planner.planning.verification import verify
 from protocol.kept_code import is_kept
+from protocol.own_program import own_environment, own_program
 from protocol.progress import ProgressOf
 
 
@@ -33,7 +33,11 @@ def compiling_beside(planner: str, progress: ProgressOf) -> Iterator[Callable[[]
         return
     # What fails there is compiled here, where it is needed.
     process = subprocess.Popen(  # noqa: S603  # this file
-        [sys.executable, "-m", __name__], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        own_program(__name__),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=own_environment(),
     )
 
     def wait() -> None:
