@@ -22,6 +22,8 @@ from protocol.whole_file import whole_file
 _SUFFIX = ".kernel"
 _DIGEST_BYTES = 32
 _DAY_S = 86_400.0
+_LAYOUT = "2"
+"""Raised when machine code is made or written in another way: code of a former layout is then never loaded."""
 UNUSED_DAYS = 60
 """Code that no run has used for so long is deleted when new code is kept."""
 
@@ -97,7 +99,7 @@ def prune(root: Path) -> None:
 @cache
 def _versions() -> tuple[str, ...]:
     """Return the versions of what compiles the code and is called by it."""
-    found = [sys.implementation.cache_tag or ""]
+    found = [_LAYOUT, sys.implementation.cache_tag or ""]
     for package in ("numba", "llvmlite", "numpy"):
         try:
             found.append(version(package))
