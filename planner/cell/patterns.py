@@ -9,19 +9,22 @@ between, and laid onto the surface. Neighbouring strips lie line width x (1 - ov
 | (b)    | cylinder | rings, helix; the line lies along the axis                |
 | (c)    | mould    | raster (zigzag from above)                                |
 | (d)    | mould    | crossed (two rasters), tilted (strips seen from two sides) |
+
+A block has the patterns of a mould, over its top.
 """
 
 import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from planner.arrays import FloatArray
 from planner.cell.cell import Probe
 from planner.cell.scan_path import looking_at
-from planner.cell.workpiece import Cylinder, Mould, Sphere
+from planner.cell.workpiece import Block, Cylinder, Mould, Sphere
 from planner.errors import PathError
 
 # Distance of the waypoints filled in between corners, in mm or in degrees of the coordinate that moves most.
@@ -144,72 +147,94 @@ def _on_cylinder(cylinder: Cylinder, probe: Probe, corners: list[tuple[float, fl
     return looking_at(points, normals, lines, probe.stand_off_mm)
 
 
-def mould_raster(mould: Mould, probe: Probe, layout: StripLayout) -> FloatArray:
-    """Return a zigzag of strips along the cavity's length, seen from straight above."""
-    return _on_mould(mould, probe, _strips(mould, probe, layout))
+class Floor(NamedTuple):
+    """A level rectangle that strips are laid on; length along x, width along y.
+
+    Attributes:
+        length_mm: How far the strips' middles go along x.
+        width_mm: How far the strips reach along y, their lines' halves included.
+        middle_mm: Its middle.
+    """
+
+    length_mm: float
+    width_mm: float
+    middle_mm: FloatArray
 
 
-def mould_crossed(mould: Mould, probe: Probe, layout: StripLayout) -> FloatArray:
-    """Return the raster along the length, then one across it with the line turned by 90 degrees."""
-    across = Mould(
-        mould.width_mm,
-        mould.length_mm,
-        mould.height_mm,
-        mould.cavity_width_mm,
-        mould.cavity_length_mm,
-        mould.cavity_depth_mm,
+def floor_of(workpiece: Mould | Block, layout: StripLayout) -> tuple[Floor, Floor]:
+    """Return what strips along x are laid on, and what strips along y are: a mould's cavity, a block's whole top."""
+    if isinstance(workpiece, Block):
+        top = Floor(workpiece.length_mm, workpiece.width_mm, np.add(workpiece.middle_mm, (0, 0, workpiece.height_mm)))
+        return top, top._replace(length_mm=top.width_mm, width_mm=top.length_mm)
+    length_mm, width_mm = workpiece.cavity_length_mm, workpiece.cavity_width_mm
+    middle_mm = np.add(workpiece.middle_mm, (0.0, 0.0, workpiece.height_mm - workpiece.cavity_depth_mm))
+    margins_mm = 2.0 * layout.wall_margin_mm
+    return (
+        Floor(max(0.0, length_mm - margins_mm), width_mm, middle_mm),
+        Floor(max(0.0, width_mm - margins_mm), length_mm, middle_mm),
     )
-    along = _strips(mould, probe, layout)
+
+
+def raster(workpiece: Mould | Block, probe: Probe, layout: StripLayout) -> FloatArray:
+    """Return a zigzag of strips along the length, seen from straight above."""
+    along, _ = floor_of(workpiece, layout)
+    return _on_floor(along, probe, _strips(along, probe, layout))
+
+
+def crossed(workpiece: Mould | Block, probe: Probe, layout: StripLayout) -> FloatArray:
+    """Return the raster along the length, then one across it with the line turned by 90 degrees."""
+    floor, across = floor_of(workpiece, layout)
+    along = _strips(floor, probe, layout)
     crossing = [(-y, x, 90.0, tilt) for x, y, _, tilt in _strips(across, probe, layout)]
-    return _on_mould(mould, probe, along + _from_nearer_end(crossing, along[-1]))
+    return _on_floor(floor, probe, along + _from_nearer_end(crossing, along[-1]))
 
 
-def mould_tilted(mould: Mould, probe: Probe, layout: StripLayout) -> FloatArray:
+def tilted(workpiece: Mould | Block, probe: Probe, layout: StripLayout) -> FloatArray:
     """Return the raster with the beam leaning to one side of the travel, then back with it leaning to the other."""
-    strips = _strips(mould, probe, layout)
+    floor, _ = floor_of(workpiece, layout)
+    strips = _strips(floor, probe, layout)
     leaning = [(x, y, turn, layout.tilt_deg) for x, y, turn, _ in strips]
     back = [(x, y, turn, -layout.tilt_deg) for x, y, turn, _ in reversed(strips)]
-    return _on_mould(mould, probe, leaning + back)
+    return _on_floor(floor, probe, leaning + back)
 
 
-MouldCorner = tuple[float, float, float, float]
-"""Where on the cavity's floor (x, y in mm), how far the line is turned about z and the beam tilted across it (deg)."""
+FloorCorner = tuple[float, float, float, float]
+"""Where on the floor (x, y in mm), how far the line is turned about z and the beam tilted across it (deg)."""
 
 
-def _strips(mould: Mould, probe: Probe, layout: StripLayout) -> list[MouldCorner]:
-    end = max(0.0, 0.5 * mould.cavity_length_mm - layout.wall_margin_mm)
-    ends = (-end, end)
-    middles = layout.strip_centres(mould.cavity_width_mm, probe.line_width_mm)
+def _strips(floor: Floor, probe: Probe, layout: StripLayout) -> list[FloorCorner]:
+    ends = (-0.5 * floor.length_mm, 0.5 * floor.length_mm)
+    middles = layout.strip_centres(floor.width_mm, probe.line_width_mm)
     return [
         (x, float(y), 0.0, 0.0) for strip, y in enumerate(middles) for x in (ends if strip % 2 == 0 else ends[::-1])
     ]
 
 
-def _from_nearer_end(corners: list[MouldCorner], start: MouldCorner) -> list[MouldCorner]:
+def _from_nearer_end(corners: list[FloorCorner], start: FloorCorner) -> list[FloorCorner]:
     first, last = (math.dist(corners[end][:2], start[:2]) for end in (0, -1))
     return corners if first <= last else corners[::-1]
 
 
-def _on_mould(mould: Mould, probe: Probe, corners: list[MouldCorner]) -> FloatArray:
+def _on_floor(floor: Floor, probe: Probe, corners: list[FloorCorner]) -> FloatArray:
     x, y, turn_deg, tilt_deg = _filled(corners).T
     turn, tilt = np.radians(turn_deg), np.radians(tilt_deg)
     # Untilted and unturned, the strip runs along x and the line lies along y.
     lines = np.column_stack((-np.sin(turn), np.cos(turn), np.zeros_like(turn)))
     normals = np.sin(tilt)[:, np.newaxis] * lines + np.cos(tilt)[:, np.newaxis] * np.array([0.0, 0.0, 1.0])
-    floor = np.full_like(x, mould.height_mm - mould.cavity_depth_mm)
-    points = np.column_stack((x, y, floor)) + mould.middle_mm
+    points = np.column_stack((x, y, np.zeros_like(x))) + floor.middle_mm
     return looking_at(points, normals, lines, probe.stand_off_mm)
 
 
 PATTERNS: dict[str, dict[str, Callable[..., FloatArray]]] = {
+    "block": {"crossed": crossed, "raster": raster, "tilted": tilted},
     "cylinder": {"helix": cylinder_helix, "rings": cylinder_rings},
-    "mould": {"crossed": mould_crossed, "raster": mould_raster, "tilted": mould_tilted},
+    "mould": {"crossed": crossed, "raster": raster, "tilted": tilted},
     "sphere": {"meridians": sphere_meridians, "spiral": sphere_spiral},
 }
 """The patterns of each workpiece class, by name; all take the workpiece, the probe and the layout."""
 
 
-def _filled(corners: list[tuple[float, ...]] | list[MouldCorner] | list[tuple[float, float]]) -> FloatArray:
+def _filled(corners: list[tuple[float, ...]] | list[FloorCorner] | list[tuple[float, float]]) -> FloatArray:
     """Return the corners with evenly spaced points between them, `(n, number of coordinates)`."""
     pieces = [np.array(corners[:1], dtype=np.float64)]
     for start, end in itertools.pairwise(corners):

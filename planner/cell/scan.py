@@ -4,7 +4,7 @@ Keys carry their units; placements are x y z in mm and yaw pitch roll in degrees
 looked for beside it.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -13,22 +13,25 @@ import numpy as np
 import trimesh
 
 from planner.arrays import FloatArray
+from planner.cell.beam_check import beam_warning
 from planner.cell.bodies import Bodies, load_bodies, shipped_bodies
 from planner.cell.cell import Cell, Probe, Table, placement
+from planner.cell.mesh_path import CLASS_OF_PATTERN, class_of, measured, mesh_waypoints
 from planner.cell.patterns import PATTERNS, StripLayout
 from planner.cell.scan_path import ScanPath, at_scan_speed, load_scan_path
 from planner.cell.workpiece import CLASSES, Workpiece
 from planner.defaults import MILLIMETRES, SCANS, shipped_scans
 from planner.errors import PlannerError, ScanFileError, WorkpieceError
 from planner.geometry.mesh import load_mesh, radius_about_axis_mm, size_fault
-from planner.kinematics.arm import Arm
+from planner.kinematics.arm import Arm, shipped_arms
 from planner.kinematics.value import ValueFunction
 from planner.table.cost import Weights, costs_overflow, default_weights
 from planner.table.motion import Limits
 from planner.toml_table import TomlTable
+from protocol.data_file import did_you_mean
 from protocol.progress import Progress
 
-_DEFAULT_ARM = "viper_s650"
+DEFAULT_ARM = "viper_s650"
 # A workpiece may touch the table, and a mesh's base need not be ground flat.
 _BASE_TOLERANCE_MM = 0.5
 
@@ -67,7 +70,8 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progre
 
     Args:
         scan: The file, or the name.
-        say: Called with one line when harmless flaws of the workpiece's mesh were mended.
+        say: Called with one line when harmless flaws of the workpiece's mesh were mended, and with one that names the
+            locations at which the beam does not meet the workpiece.
         progress: See `load_mesh`.
 
     Raises:
@@ -81,14 +85,19 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progre
     top.only("cell", "workpiece", "path", "value", "limits", "weights")
     with _named(file):
         cell, bodies = _read_cell(top.table("cell"), file.parent)
-        workpiece, mesh, mesh_file = _read_workpiece(top.table("workpiece"), file.parent, say, progress)
-        _check_it_fits_the_table(mesh, cell)
-        path = _read_path(top.table("path"), file.parent, cell.probe, workpiece)
+        workpiece, mesh, mesh_file = _read_workpiece(top.table("workpiece"), file.parent, cell, say, progress)
+        check_it_fits_the_table(mesh, cell)
+        path = _read_path(top.table("path"), file.parent, cell, workpiece, mesh if mesh_file else None)
         value = ValueFunction.read(top.table("value"))
         limits = _read_limits(top.table("limits"))
         weights = _read_weights(top.table("weights"), limits)
         if costs_overflow(weights, limits, len(path.T_WS)):
             raise ScanFileError(f"{file}: weights: k_a or k_w is so large that the cost of a path overflows; lower it")
+    # A pattern on a shape of given dimensions meets it by construction.
+    if say is not None and (mesh_file is not None or "file" in top.table("path")):
+        warning = beam_warning(path.T_WS, mesh, cell.probe)
+        if warning is not None:
+            say(f"{file}: path: {warning}")
     return Scan(file.stem, cell, bodies, workpiece, mesh, mesh_file, path, value, limits, weights)
 
 
@@ -106,7 +115,7 @@ def with_mesh(
     """
     mesh = load_mesh(file, unit, say, progress)
     with _named(file):
-        _check_it_fits_the_table(mesh, scan.cell)
+        check_it_fits_the_table(mesh, scan.cell)
     return replace(scan, workpiece=None, mesh=mesh, mesh_file=file)
 
 
@@ -122,7 +131,7 @@ def _named(file: Path) -> Iterator[None]:
 
 
 def _read_cell(section: TomlTable, folder: Path) -> tuple[Cell, Bodies]:
-    arm_file = _beside(folder, section.text("arm", _DEFAULT_ARM))
+    arm_file = _beside(section, folder, "arm", shipped_arms())
     arm = Arm.load(arm_file)
     bodies_file = _bodies_file(section, folder, arm_file)
     placed = {
@@ -139,7 +148,7 @@ def _read_cell(section: TomlTable, folder: Path) -> tuple[Cell, Bodies]:
 def _bodies_file(section: TomlTable, folder: Path, arm_file: Path | str) -> Path | str:
     """Return the file of the arm's bodies: a shipped arm brings its own, of any other arm nothing is known."""
     if "bodies" in section:
-        return _beside(folder, section.text("bodies"))
+        return _beside(section, folder, "bodies", shipped_bodies())
     if arm_file in shipped_bodies():
         return arm_file
     raise section.refuse(
@@ -149,9 +158,16 @@ def _bodies_file(section: TomlTable, folder: Path, arm_file: Path | str) -> Path
     )
 
 
-def _beside(folder: Path, name: str) -> Path | str:
-    """Return the file of that name in the scan file's folder, else the name: that of a shipped one."""
-    return folder / name if (folder / name).is_file() else name
+def _beside(section: TomlTable, folder: Path, key: str, shipped: Sequence[str]) -> Path | str:
+    """Return the file that a key names in the scan file's folder, else the name if it is that of a shipped one."""
+    name = section.text(key, DEFAULT_ARM)
+    if (folder / name).is_file():
+        return folder / name
+    if name not in shipped:
+        raise section.refuse(
+            key, f"a file beside the scan, or one of {', '.join(shipped)}{did_you_mean(name, shipped)}"
+        )
+    return name
 
 
 def _placement(section: TomlTable, key: str) -> FloatArray:
@@ -184,7 +200,7 @@ def _read_probe(section: TomlTable) -> Probe:
 
 
 def _read_workpiece(
-    section: TomlTable, folder: Path, say: Callable[[str], None] | None, progress: Progress | None
+    section: TomlTable, folder: Path, cell: Cell, say: Callable[[str], None] | None, progress: Progress | None
 ) -> tuple[Workpiece | None, trimesh.Trimesh, Path | None]:
     if "mesh" in section:
         mesh_file = folder / section.text("mesh")
@@ -192,7 +208,7 @@ def _read_workpiece(
         unit = section.choice("unit", tuple(MILLIMETRES)) if "unit" in section else None
         section.finish()
         mesh = load_mesh(mesh_file, unit, say, progress)
-        return (CLASSES[kind].measured(mesh) if kind != "other" else None), mesh, mesh_file
+        return (measured(mesh, kind, cell.T_TW)[0] if kind != "other" else None), mesh, mesh_file
     shape = CLASSES[section.choice("class", tuple(CLASSES))]
     names = [item.name for item in fields(shape) if item.name != "middle_mm"]
     workpiece = shape(middle_mm=(0.0, 0.0, 0.0), **{name: section.number(name, above=0.0) for name in names})
@@ -204,7 +220,12 @@ def _read_workpiece(
     return workpiece, mesh, None
 
 
-def _check_it_fits_the_table(mesh: trimesh.Trimesh, cell: Cell) -> None:
+def check_it_fits_the_table(mesh: trimesh.Trimesh, cell: Cell) -> None:
+    """Refuse a workpiece that reaches beyond the table's edge or below its top.
+
+    Raises:
+        WorkpieceError: It does.
+    """
     reach_mm = radius_about_axis_mm(mesh, cell.T_TW)
     if reach_mm > cell.table.radius_mm:
         raise WorkpieceError(
@@ -216,21 +237,29 @@ def _check_it_fits_the_table(mesh: trimesh.Trimesh, cell: Cell) -> None:
         raise WorkpieceError(f"the workpiece reaches {-lowest_mm:.1f} mm below the table's top; it must stand on it")
 
 
-def _read_path(section: TomlTable, folder: Path, probe: Probe, workpiece: Workpiece | None) -> ScanPath:
+def _read_path(
+    section: TomlTable, folder: Path, cell: Cell, workpiece: Workpiece | None, mesh: trimesh.Trimesh | None
+) -> ScanPath:
+    """Return the path; `mesh` is None for a workpiece of given dimensions."""
     step_s = section.number("time_step_s", above=0.0)
     if "file" in section:
         file = folder / section.text("file")
         section.finish()
         return load_scan_path(file, step_s)
-    if workpiece is None:
-        raise section.refuse("file", "a path file, because the workpiece has no class with predefined patterns")
-    patterns = PATTERNS[type(workpiece).__name__.lower()]
-    pattern = patterns[section.choice("pattern", tuple(patterns))]
+    kind = "other" if workpiece is None else type(workpiece).__name__.lower()
+    # A pattern of another class can be laid on a mesh as well.
+    patterns = sorted(PATTERNS[kind] if mesh is None else CLASS_OF_PATTERN)
+    if workpiece is None and "pattern" not in section:
+        raise section.refuse("file", f"a path file, unless path.pattern is one of {', '.join(patterns)}")
+    pattern = section.choice("pattern", patterns)
     speed_mm_s = section.number("scan_speed_mm_s", above=0.0)
     layout = _read_layout(section)
     section.finish()
-    waypoints = pattern(workpiece, probe, layout)
-    return at_scan_speed(waypoints, speed_mm_s, step_s, probe.stand_off_mm, probe.line_width_mm)
+    if mesh is None:
+        waypoints = PATTERNS[kind][pattern](workpiece, cell.probe, layout)
+    else:
+        waypoints = mesh_waypoints(mesh, class_of(kind, pattern), pattern, cell.T_TW, cell.probe, layout)
+    return at_scan_speed(waypoints, speed_mm_s, step_s, cell.probe.stand_off_mm, cell.probe.line_width_mm)
 
 
 def _read_layout(section: TomlTable) -> StripLayout:

@@ -125,9 +125,31 @@ class Mould:
         return cls(length, width, height, left + right, front + back, depth, middle)
 
 
-Workpiece = Sphere | Cylinder | Mould
+@dataclass(frozen=True)
+class Block:
+    """A block that is scanned from above; length along x, width along y."""
 
-CLASSES: dict[str, type[Workpiece]] = {"cylinder": Cylinder, "mould": Mould, "sphere": Sphere}
+    length_mm: float
+    width_mm: float
+    height_mm: float
+    middle_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def mesh(self) -> trimesh.Trimesh:
+        """Return the closed surface in frame W."""
+        mesh: trimesh.Trimesh = trimesh.creation.box((self.length_mm, self.width_mm, self.height_mm))
+        mesh.apply_translation(np.add(self.middle_mm, (0.0, 0.0, 0.5 * self.height_mm)))
+        return mesh
+
+    @classmethod
+    def measured(cls, mesh: trimesh.Trimesh) -> "Block":
+        """Return the mesh's bounding box."""
+        (length, width, height), middle = _box(mesh)
+        return cls(length, width, height, middle)
+
+
+Workpiece = Sphere | Cylinder | Mould | Block
+
+CLASSES: dict[str, type[Workpiece]] = {"block": Block, "cylinder": Cylinder, "mould": Mould, "sphere": Sphere}
 
 
 def _box(mesh: trimesh.Trimesh) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

@@ -25,6 +25,11 @@ _ORTHO_PARALLEL_ALPHA_DEG = (-90.0, 0.0, 90.0, -90.0, 90.0, 0.0)
 D_MM, A_MM, COS_ALPHA, SIN_ALPHA, LOWER_RAD, UPPER_RAD = range(6)
 
 
+def shipped_arms() -> list[str]:
+    """Return the names of the arms that come with the planner."""
+    return sorted(file.stem for file in _SHIPPED.glob("*.toml"))
+
+
 @dataclass(frozen=True)
 class Arm:
     """A Denavit-Hartenberg table with joint limits and speeds, one entry per joint.

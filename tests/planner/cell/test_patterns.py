@@ -8,11 +8,12 @@ from planner.arrays import FloatArray
 from planner.cell.cell import Probe
 from planner.cell.patterns import PATTERNS, StripLayout
 from planner.cell.scan_path import at_scan_speed
-from planner.cell.workpiece import Cylinder, Mould, Sphere, Workpiece
+from planner.cell.workpiece import Block, Cylinder, Mould, Sphere, Workpiece
 
 PROBE = Probe()
 LAYOUT = StripLayout()
 WORKPIECES: dict[str, Workpiece] = {
+    "block": Block(300.0, 200.0, 50.0, middle_mm=(5.0, -10.0, 20.0)),
     "sphere": Sphere(160.0, middle_mm=(5.0, -10.0, 20.0)),
     "cylinder": Cylinder(140.0, 180.0, middle_mm=(5.0, -10.0, 20.0)),
     "mould": Mould(300.0, 200.0, 80.0, 240.0, 140.0, 50.0, middle_mm=(5.0, -10.0, 20.0)),
@@ -43,7 +44,7 @@ def test_the_beam_meets_the_surface_at_the_stand_off(kind: str, pattern: str) ->
     assert distances.max() < 0.3  # how far the sphere's mesh is from the sphere
 
 
-@pytest.mark.parametrize(("kind", "pattern"), [pair for pair in ALL if pair[0] != "mould"])
+@pytest.mark.parametrize(("kind", "pattern"), [pair for pair in ALL if pair[0] not in ("block", "mould")])
 def test_the_beam_comes_in_along_the_normal(kind: str, pattern: str) -> None:
     waypoints = waypoints_of(kind, pattern)
     mesh = WORKPIECES[kind].mesh()
@@ -88,6 +89,14 @@ def test_the_line_passes_over_the_floor_of_the_mould_up_to_the_wall_margin(patte
     covered = covered_points(waypoints_of("mould", pattern))
     # A tilted line leaves the floor's plane towards its ends: follow it along the beam down to the floor.
     assert _greatest_gap(covered[:, :2], wanted[:, :2]) < 6.0
+
+
+def test_a_raster_over_a_block_goes_from_edge_to_edge() -> None:
+    waypoints = waypoints_of("block", "raster")
+    covered = covered_points(waypoints)
+    np.testing.assert_allclose([covered[:, 0].min(), covered[:, 0].max()], [-145.0, 155.0])
+    np.testing.assert_allclose([covered[:, 1].min(), covered[:, 1].max()], [-110.0, 90.0])
+    np.testing.assert_allclose(covered[:, 2], 70.0)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
