@@ -1,3 +1,79 @@
-"""The scan planner: kinematics, configuration maps, planners, streaming and alignment."""
+"""The scan planner: from a scan to configuration maps, to a plan, to a verified run on the table.
+
+    scan = planner.load_scan("cylinder")
+    planned = planner.plan(scan)
+    finished = planner.run(planned, "emulator://", "build/run")
+
+Each name is loaded when it is first used, so that `import planner` takes no time.
+"""
 
 import protocol.quiet_start  # noqa: F401 - before the imports that take long
+
+# isort: split
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from planner.api import PlannedScan, build_maps, plan, run, with_factors
+    from planner.cell.scan import Scan, load_scan
+    from planner.errors import PlannerError
+    from planner.execution.run import RunOptions
+    from planner.kinematics.configuration import Configuration
+    from planner.kinematics.value import RatedPoses, UserFactor
+    from planner.map.config_map import ConfigurationMap
+    from planner.planning.plan import Infeasibility, NoPlan, Plan, make_plan
+    from planner.planning.problem import Problem
+
+_HOME = {
+    "Configuration": "planner.kinematics.configuration",
+    "ConfigurationMap": "planner.map.config_map",
+    "Infeasibility": "planner.planning.plan",
+    "NoPlan": "planner.planning.plan",
+    "Plan": "planner.planning.plan",
+    "PlannedScan": "planner.api",
+    "PlannerError": "planner.errors",
+    "Problem": "planner.planning.problem",
+    "RatedPoses": "planner.kinematics.value",
+    "RunOptions": "planner.execution.run",
+    "Scan": "planner.cell.scan",
+    "UserFactor": "planner.kinematics.value",
+    "build_maps": "planner.api",
+    "load_scan": "planner.cell.scan",
+    "make_plan": "planner.planning.plan",
+    "plan": "planner.api",
+    "run": "planner.api",
+    "with_factors": "planner.api",
+}
+"""Where each public name comes from."""
+
+__all__ = [
+    "Configuration",
+    "ConfigurationMap",
+    "Infeasibility",
+    "NoPlan",
+    "Plan",
+    "PlannedScan",
+    "PlannerError",
+    "Problem",
+    "RatedPoses",
+    "RunOptions",
+    "Scan",
+    "UserFactor",
+    "build_maps",
+    "load_scan",
+    "make_plan",
+    "plan",
+    "run",
+    "with_factors",
+]
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401  # any public name
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = getattr(import_module(_HOME[name]), name)
+    return globals()[name]
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -29,7 +29,7 @@ def _status_of(chosen: argparse.Namespace) -> int:
     try:
         if getattr(chosen, "configuration", "all") not in {"all", "best"}:
             Configuration.parse(chosen.configuration)  # a misspelt name is refused before what takes long is loaded
-        return int(import_module(f"planner.commands.{chosen.command}").run(chosen))
+        return int(import_module(f"planner.commands.{chosen.command.replace('-', '_')}").run(chosen))
     except PlannerError as error:
         print(f"{name}: {error}", file=sys.stderr)
         return _BAD_INPUT

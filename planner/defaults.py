@@ -25,6 +25,14 @@ PLANNER_NAMES = (
 )
 DEFAULT_PLANNER = DYNAMIC_PROGRAMMING
 
+DEFAULT_ANGLES = 360
+"""Table angles of a map over one turn."""
+
+PART_CLASSES = ("block", "cylinder", "mould", "sphere")
+PATTERN_NAMES = ("crossed", "helix", "meridians", "raster", "rings", "spiral", "tilted")
+AXES = ("x", "-x", "y", "-y", "z", "-z")
+"""Axes of a mesh file that can point up."""
+
 MILLIMETRES: Mapping[str, float] = MappingProxyType({"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4})
 """The units of length that a mesh file may be in, in mm."""
 

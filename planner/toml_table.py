@@ -98,6 +98,13 @@ class TomlTable:
             raise self.refuse(key, "a text")
         return value
 
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Return the list `key` of texts; an absent one is empty."""
+        value = self._take(key, [])
+        if not isinstance(value, list) or not all(isinstance(item, str) and item for item in value):
+            raise self.refuse(key, "a list of texts")
+        return tuple(value)
+
     def choice(self, key: str, choices: Sequence[str], default: str | None = None) -> str:
         """Return the text `key`, which is one of `choices`; required without a default."""
         value = self._take(key, default)

@@ -5,17 +5,23 @@ import math
 from pathlib import Path
 
 from planner.defaults import (
+    AXES,
+    DEFAULT_ANGLES,
     DEFAULT_PLANNER,
     LAG_S,
     LEAD_S,
     MILLIMETRES,
+    PART_CLASSES,
+    PATTERN_NAMES,
     PLANNER_NAMES,
     PROFILES_HZ,
     RUN_ON_DEG,
     TOLERANCE_DEG,
     shipped_scans,
 )
+from planner.plug_ins import PLANNER_GROUP, plug_in_names
 from protocol.command_line import Parser, program_name
+from protocol.data_file import did_you_mean
 from protocol.number_options import number, positive_number, whole_number
 
 _Commands = "argparse._SubParsersAction[argparse.ArgumentParser]"
@@ -35,6 +41,7 @@ def parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_scan(commands)
     _add_show(commands)
+    _add_new_scan(commands)
     return top
 
 
@@ -61,7 +68,11 @@ def _add_plan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     _add_scan_option(parser)
     _add_map_option(parser, configuration="best")
     parser.add_argument(
-        "--planner", choices=list(PLANNER_NAMES), default=DEFAULT_PLANNER, help=f"default: {DEFAULT_PLANNER}"
+        "--planner",
+        type=_planner_name,
+        default=DEFAULT_PLANNER,
+        metavar="NAME",
+        help=f"one of {', '.join(PLANNER_NAMES)}, or an installed plug-in (default: {DEFAULT_PLANNER})",
     )
     parser.add_argument("--start", type=_angle, metavar="DEG", help="table angle at the first location (default: free)")
     parser.add_argument("--smooth", action="store_true", help="lower the plan's acceleration peaks afterwards")
@@ -162,6 +173,35 @@ def _add_show(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     parser.add_argument("--out", metavar="FILE", type=Path, help=f"the page (default: {REPORT_FILE} in DIR)")
 
 
+def _add_new_scan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "new-scan",
+        help="write a scan file for a mesh",
+        description="Write a commented scan file for a mesh, with a pattern that fits and that can be planned.",
+        epilog="example: python -m planner new-scan part.stl --out part.toml",
+    )
+    parser.add_argument("mesh", metavar="MESH", type=Path, help="an STL, PLY or OBJ file with a closed surface")
+    parser.add_argument("--unit", choices=tuple(MILLIMETRES), help="unit of length in the file (default: mm)")
+    parser.add_argument(
+        "--up",
+        choices=AXES,
+        default="z",
+        help="axis of the file that points up, such as --up=-z (default: z)",
+    )
+    parser.add_argument(
+        "--class", dest="kind", choices=PART_CLASSES, help="class of the part (default: guessed from the mesh)"
+    )
+    parser.add_argument("--pattern", choices=PATTERN_NAMES, help="pattern of the path (default: the first that plans)")
+    parser.add_argument("--out", metavar="FILE", type=Path, help="the scan file (default: MESH.toml in this folder)")
+
+
+def _planner_name(text: str) -> str:
+    names = [*PLANNER_NAMES, *(() if text in PLANNER_NAMES else plug_in_names(PLANNER_GROUP))]
+    if text not in names:
+        raise argparse.ArgumentTypeError(f"is {text}; allowed are {', '.join(names)}{did_you_mean(text, names)}")
+    return text
+
+
 def _angle(text: str) -> float:
     try:
         angle = float(text)
@@ -188,9 +228,9 @@ def _add_map_option(parser: argparse.ArgumentParser, configuration: str) -> None
     parser.add_argument(
         "--angles",
         type=whole_number(8, 36_000),
-        default=360,
+        default=DEFAULT_ANGLES,
         metavar="COUNT",
-        help="table angles over one turn (default 360)",
+        help="table angles over one turn (default %(default)s)",
     )
 
 

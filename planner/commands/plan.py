@@ -17,14 +17,15 @@ from planner.kinematics.configuration import Configuration
 from planner.map.map_file import MAP_FILE, save_maps
 from planner.planning.arm_motion import ArmMotion, arm_follows
 from planner.planning.arm_plots import plot_arm
+from planner.planning.own_planners import planner_named, planner_names
 from planner.planning.plan import NoPlan, Outcome, Plan, Planner
 from planner.planning.plan_file import plan_document, save_plan
 from planner.planning.plan_plots import plot_plan
-from planner.planning.planners import PLANNERS
 from planner.planning.problem import Problem
 from planner.planning.scan_planning import plan_scan
 from planner.planning.smoothing import smooth
 from planner.planning.verification import verify
+from planner.plug_ins import PlugInError
 from planner.set_aside import set_aside
 from protocol.progress import progress_line
 
@@ -35,9 +36,9 @@ PLAN_RESULTS = (PLAN_FILE, "plan.png", "arm.png", MAP_FILE, *RUN_RESULTS)
 
 def run(arguments: argparse.Namespace) -> int:
     """Write plan, map and pictures, print cost, time and margins, and return the exit status."""
+    planner = planner_named(arguments.planner)
     set_aside(arguments.out, PLAN_RESULTS)
     scan = load_scan(arguments.scan, options.say, progress_line("mesh", sys.stderr))
-    planner = PLANNERS[arguments.planner]
     plans = plan_scan(
         scan,
         arguments.configuration,
@@ -57,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     sys.stdout.write(report(scan, chosen, plan, motion))
     if arguments.compare:
         start = replace(chosen, start_angle_deg=float(plan.angles_deg[0]))
-        sys.stdout.write(comparison_table(start, {name: timed(planner)(start) for name, planner in PLANNERS.items()}))
+        sys.stdout.write(comparison_table(start, {name: compared(name, start) for name in planner_names()}))
     return 0 if motion.step is None and verify(chosen, plan).is_executable else _NO_PLAN
 
 
@@ -136,12 +137,20 @@ def _arm_lines(motion: ArmMotion) -> list[str]:
     ]
 
 
-def comparison_table(problem: Problem, outcomes: Mapping[str, Outcome]) -> str:
+def compared(name: str, problem: Problem) -> Outcome | PlugInError:
+    """Return what a planner answers; a plug-in that is broken keeps no other planner from answering."""
+    try:
+        return timed(planner_named(name))(problem)
+    except PlugInError as error:
+        return error
+
+
+def comparison_table(problem: Problem, outcomes: Mapping[str, Outcome | PlugInError]) -> str:
     """Return a line for each planner: cost, violations, pauses and time, all from the same start."""
     lines = [f"{'planner':20} {'cost':>10} {'forbidden steps':>15} {'within limits':>13} {'pauses':>6} {'ms':>9}  arm"]
     for name, outcome in outcomes.items():
-        if isinstance(outcome, NoPlan):
-            lines.append(f"{name:20} {outcome.reason}")
+        if isinstance(outcome, NoPlan | PlugInError):
+            lines.append(f"{name:20} {outcome.reason if isinstance(outcome, NoPlan) else outcome}")
             continue
         checked = verify(problem, outcome)
         lines.append(

@@ -13,14 +13,13 @@ from planner.kinematics.configuration import Configuration
 from planner.map.map_file import MAP_FILE, load_maps
 from planner.planning.arm_check import PlannedArm, arm_fault
 from planner.planning.plan import Plan, path_cost
+from planner.planning.plan_check import contradiction
 from planner.planning.plan_file import load_plan
 from planner.planning.problem import Problem
 from planner.planning.verification import verify
 from planner.table.cost import Weights
-from planner.table.motion import Limits, next_angle, next_speed
+from planner.table.motion import Limits
 from protocol.data_file import read_json
-
-_ROUNDING = 1e-6
 
 
 class RunInputError(PlannerError):
@@ -112,20 +111,9 @@ def _check(plan_file: Path, run_input: RunInput) -> None:
     numbers = plan.angles_deg, plan.speeds_deg_s, plan.accelerations_deg_s2
     if not all(np.isfinite(array).all() for array in numbers):
         raise RunInputError(f"{plan_file}: is damaged: it holds values that are no numbers")
-    paused = {pause.step for pause in plan.pauses}
-    for step, from_deg, to_deg in plan.pauses:
-        if not 0 <= step < locations - 1 or (from_deg, to_deg, 0.0) != (
-            plan.angles_deg[step], plan.angles_deg[step + 1], plan.speeds_deg_s[step + 1]
-        ):  # fmt: skip
-            raise RunInputError(f"{plan_file}: has been edited: the pause in step {step} contradicts the angles")
-    for k, acceleration in enumerate(plan.accelerations_deg_s2):
-        angle, speed = float(plan.angles_deg[k]), float(plan.speeds_deg_s[k])
-        angle_error = plan.angles_deg[k + 1] - next_angle(angle, speed, float(acceleration), plan.step_s)
-        speed_error = plan.speeds_deg_s[k + 1] - next_speed(speed, float(acceleration), plan.step_s)
-        if k not in paused and max(abs(angle_error), abs(speed_error)) > _ROUNDING:
-            raise RunInputError(
-                f"{plan_file}: has been edited: angle, speed and acceleration of step {k} contradict one another"
-            )
+    fault = contradiction(plan)
+    if fault is not None:
+        raise RunInputError(f"{plan_file}: has been edited: {fault}")
     checked = verify(problem, plan)
     if not checked.within_limits:
         raise RunInputError(f"{plan_file}: exceeds its own limits; plan anew")

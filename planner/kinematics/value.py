@@ -17,6 +17,7 @@ from planner.errors import ScanFileError
 from planner.kernel import kernel
 from planner.kinematics.arm import Arm
 from planner.kinematics.configuration import Configuration
+from planner.plug_ins import FACTOR_GROUP, PlugInError, failure, load_plug_in
 from planner.toml_table import TomlTable
 
 JOINT_FACTORS = tuple(f"joint_{joint}" for joint in range(1, 7))
@@ -59,6 +60,31 @@ class UserFactor(NamedTuple):
 
     name: str
     rate: Callable[[RatedPoses], FloatArray]
+
+
+def plug_in_factor(name: str) -> UserFactor:
+    """Return the factor of an installed package; what it returns is checked.
+
+    Raises:
+        PlugInError: There is none of that name, or it cannot be loaded; while maps are built, that it failed.
+    """
+    rate = load_plug_in(FACTOR_GROUP, name)
+    if not callable(rate):
+        raise PlugInError(f"factor {name!r}: is not a function; it must take RatedPoses and return a number for each")
+
+    def checked(poses: RatedPoses) -> FloatArray:
+        count = len(poses.clearance_mm)
+        try:
+            rates = np.asarray(rate(poses), dtype=np.float64)
+        except Exception as error:
+            raise failure(FACTOR_GROUP, name, "failed", error) from error
+        if rates.shape != (count,):
+            raise PlugInError(f"factor {name!r}: returned an array of shape {rates.shape}; it must be ({count},)")
+        if not ((rates >= 0.0) & (rates <= 1.0)).all():
+            raise PlugInError(f"factor {name!r}: returned a value outside 0 to 1")
+        return rates
+
+    return UserFactor(name, checked)
 
 
 @dataclass(frozen=True)
@@ -134,18 +160,23 @@ class ValueFunction:
     def read(cls, table: TomlTable) -> "ValueFunction":
         """Return the value function that a table of a scan file asks for; what is absent keeps its default.
 
-        The keys are the attributes' names, and the factors' names with "on" or "off".
+        The keys are the attributes' names, and the factors' names with "on" or "off"; `user_factors` is a list of the
+        names of installed plug-ins (`planner.plug_ins`).
 
         Raises:
             ScanFileError: A key is unknown, or a value is not allowed.
+            PlugInError: A factor is not installed, or cannot be loaded.
         """
         default = cls()
         on = frozenset(name for name in FACTORS if table.choice(name, ("on", "off"), "on") == "on")
         gamma = table.numbers("gamma", 6, default.gamma)
         numbers: dict[str, Any] = {name: table.number(name, getattr(default, name)) for name in _NUMBERS}
+        own = table.texts("user_factors")
+        if len(set(own)) < len(own):
+            raise table.refuse("user_factors", "a list of different names")
         table.finish()
         try:
-            return replace(default, factors=on, gamma=gamma, **numbers)
+            return replace(default, factors=on, gamma=gamma, user_factors=tuple(map(plug_in_factor, own)), **numbers)
         except ValueError as error:
             raise ScanFileError(f"{table.file}: {error}") from error
 

@@ -24,11 +24,16 @@ class Comparison(NamedTuple):
     best: str | None
 
     @property
-    def refusal(self) -> str:
-        """Where there is no plan, the reason of the configuration that gets farthest."""
+    def farthest(self) -> tuple[str, NoPlan]:
+        """Where there is no plan, the configuration that gets farthest, and why no farther."""
         refused = {name: each for name, each in self.outcomes.items() if isinstance(each, NoPlan)}
-        name, farthest = max(refused.items(), key=lambda item: item[1].location or 0)
-        return f"{name} gets farthest: {farthest.reason}"
+        return max(refused.items(), key=lambda item: item[1].location or 0)
+
+    @property
+    def refusal(self) -> str:
+        """The same in words."""
+        name, no_plan = self.farthest
+        return f"{name} gets farthest: {no_plan.reason}"
 
     def why_no_plan(self, scan: Scan) -> str:
         """Return in one sentence why a scan has no plan; where whole locations are blocked, a wrong unit may be why."""

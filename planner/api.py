@@ -1,0 +1,141 @@
+"""What programs use of the planner, from a scan to maps, to a plan, to a verified run; `import planner` gives it all."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from planner.cell.scan import Scan
+from planner.defaults import DEFAULT_PLANNER
+from planner.execution.run import Finished, RunOptions, run_plan
+from planner.execution.run_file import PLAN_FILE
+from planner.kinematics.configuration import Configuration
+from planner.kinematics.value import UserFactor
+from planner.map.config_map import ConfigurationMap
+from planner.map.map_builder import build_maps as maps_of
+from planner.map.map_file import MAP_FILE, save_maps
+from planner.map.map_problem import map_problem
+from planner.planning.arm_motion import ArmMotion
+from planner.planning.own_planners import checked, planner_named
+from planner.planning.plan import NoPlan, Outcome, Plan, Planner
+from planner.planning.plan_file import plan_document, save_plan
+from planner.planning.problem import Problem
+from planner.planning.scan_planning import plan_scan
+from planner.planning.verification import Verification, verify
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedScan:
+    """A scan with the plan of its best arm configuration.
+
+    Attributes:
+        scan: What is scanned.
+        problem: Map, limits and weights of that configuration.
+        plan: The table's motion.
+        arm: The arm's motion that belongs to it.
+        outcomes: What the planner answered in each configuration, by name.
+    """
+
+    scan: Scan
+    problem: Problem
+    plan: Plan
+    arm: ArmMotion
+    outcomes: dict[str, Outcome]
+
+    @property
+    def verification(self) -> Verification:
+        """What the execution of the plan would meet."""
+        return verify(self.problem, self.plan)
+
+    @property
+    def is_executable(self) -> bool:
+        """Whether the table can carry the plan out, nothing forbidden is met, and the arm can follow."""
+        return self.verification.is_executable and self.arm.step is None
+
+    def save(self, folder: str | Path) -> Path:
+        """Write `plan.json` and `map.npz` into a folder, and return the first: what `python -m planner run` takes.
+
+        Raises:
+            OSError: They cannot be written.
+        """
+        plan_file = Path(folder) / PLAN_FILE
+        plan_file.parent.mkdir(parents=True, exist_ok=True)
+        save_plan(plan_file, plan_document(self.scan, self.problem, self.plan, self.arm))
+        save_maps(plan_file.with_name(MAP_FILE), {Configuration.parse(self.plan.configuration): self.problem.map})
+        return plan_file
+
+
+def with_factors(scan: Scan, *factors: UserFactor) -> Scan:
+    """Return the scan with further factors of the value function."""
+    return replace(scan, value=replace(scan.value, user_factors=(*scan.value.user_factors, *factors)))
+
+
+def build_maps(
+    scan: Scan, configurations: Sequence[Configuration] = tuple(Configuration), angle_count: int = 360
+) -> dict[Configuration, ConfigurationMap]:
+    """Return the maps `(locations, angle_count)` of a scan, by arm configuration.
+
+    Raises:
+        PlannerError: The maps would have too many cells, or an installed factor failed.
+        ValueError: A factor of `with_factors` returned a wrong shape or a value outside 0 to 1.
+    """
+    return maps_of(map_problem(scan), configurations, angle_count)
+
+
+def plan(
+    scan: Scan,
+    planner: str | Callable[[Problem], Outcome] = DEFAULT_PLANNER,
+    configuration: str = "best",
+    angle_count: int = 360,
+    start_angle_deg: float | None = None,
+) -> PlannedScan | NoPlan:
+    """Plan the table's motion along a scan.
+
+    Args:
+        scan: What is scanned.
+        planner: A shipped planner or an installed plug-in by its name, or a function.
+        configuration: An arm configuration such as `LEFTY-ABOVE-NOFLIP`, or `best`.
+        angle_count: Table angles over one turn.
+        start_angle_deg: The table's angle at the first location; None leaves it free.
+
+    Returns:
+        The plan that the arm can follow at the least cost, or, where there is none, why.
+
+    Raises:
+        PlannerError: A name is not known, or the planner returned something that is not an answer.
+    """
+    chosen: Planner = planner_named(planner) if isinstance(planner, str) else checked(_name(planner), planner)
+    plans = plan_scan(scan, configuration, angle_count, chosen, lambda _label: None, start_angle_deg)
+    if plans.best is None:
+        return plans.comparison.farthest[1]
+    return PlannedScan(scan, *plans.best, dict(plans.comparison.outcomes))
+
+
+def _name(planner: Callable[[Problem], Outcome]) -> str:
+    return str(getattr(planner, "__name__", type(planner).__name__))
+
+
+def run(
+    planned: PlannedScan | str | Path,
+    port: str,
+    out: str | Path,
+    options: RunOptions | None = None,
+) -> Finished:
+    """Carry a plan out on the table at a port, verify the motion, and write what happened into a folder.
+
+    Args:
+        planned: A plan, or the name of a `plan.json`.
+        port: A device, `socket://HOST:PORT`, or `emulator://` for a simulated table.
+        out: The folder.
+        options: All other settings; `port` in it does not count.
+
+    Raises:
+        PlannerError: The plan must not, or cannot, be run; nothing has moved.
+        TableError: The table could not be reached, or not be brought to the start.
+        OSError: The folder cannot be written.
+    """
+    chosen = RunOptions(port) if options is None else options._replace(port=port)
+    if not isinstance(planned, PlannedScan):
+        return run_plan(Path(planned), Path(out), chosen)
+    with TemporaryDirectory() as folder:
+        return run_plan(planned.save(folder), Path(out), chosen)

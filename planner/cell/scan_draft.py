@@ -1,0 +1,256 @@
+"""A scan of a mesh that somebody brings: what is assumed of it, as a scan and as the text of a scan file."""
+
+import json
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from planner.arrays import FloatArray
+from planner.cell.bodies import load_bodies
+from planner.cell.cell import Cell, placement
+from planner.cell.mesh_path import CLASS_OF_PATTERN, class_of, measured, mesh_waypoints
+from planner.cell.part_class import PartClass, part_class
+from planner.cell.patterns import StripLayout
+from planner.cell.scan import DEFAULT_ARM, Scan, check_it_fits_the_table
+from planner.cell.scan_path import ScanPath, at_scan_speed
+from planner.errors import PlannerError
+from planner.kinematics.arm import Arm
+from planner.kinematics.value import ValueFunction
+from planner.table.cost import default_weights
+from planner.table.motion import Limits
+
+TURN_TO_UP = {
+    "z": (0.0, 0.0, 0.0),
+    "-z": (0.0, 180.0, 0.0),
+    "x": (0.0, -90.0, 0.0),
+    "-x": (0.0, 90.0, 0.0),
+    "y": (0.0, -90.0, -90.0),
+    "-y": (0.0, -90.0, 90.0),
+}
+"""Yaw, pitch and roll in degrees that turn an axis of a mesh file upwards."""
+
+FIRST_PATTERN = {"block": "raster", "cylinder": "rings", "mould": "raster", "sphere": "meridians"}
+
+_FASTEST_MM_S = 30.0
+# A ring has to be undone by the table, whose limit is 40 deg/s.
+_FASTEST_RAD_S = math.radians(23.0)
+_STEP_S, _SHORTEST_STEP_S, _LONGEST_STEP_S = 0.5, 0.2, 1.2
+_FEWEST, _MOST = 40, 250  # locations: fewer leave holes between looks at the map, more take long to plan
+_BOTTOM_MARGINS_MM = 60.0, 90.0, 120.0, 150.0
+_POLAR_ENDS_DEG = 85.0, 65.0, 45.0
+
+
+@dataclass(frozen=True)
+class Part:
+    """A mesh, and how it is placed.
+
+    Attributes:
+        mesh: Its surface in the frame of its file, in mm.
+        file: Where it was read.
+        unit: The unit of the file, one of `MILLIMETRES`.
+        up: The axis of the file that points up, one of `TURN_TO_UP`.
+    """
+
+    mesh: trimesh.Trimesh
+    file: Path
+    unit: str = "mm"
+    up: str = "z"
+
+    @property
+    def placement(self) -> tuple[float, ...]:
+        """The placement on the table, x y z yaw pitch roll: its middle on the axis, its lowest point on the top."""
+        turned = np.asarray(self.mesh.vertices) @ placement(0.0, 0.0, 0.0, *TURN_TO_UP[self.up])[:3, :3].T
+        lower, upper = turned.min(axis=0), turned.max(axis=0)
+        x, y = -0.5 * (lower + upper)[:2]
+        return (*(round(float(value), 3) + 0.0 for value in (x, y, -lower[2])), *TURN_TO_UP[self.up])
+
+    @property
+    def cell(self) -> Cell:
+        """The default cell with the part on its table."""
+        return Cell(arm=Arm.load(DEFAULT_ARM), T_TW=placement(*self.placement))
+
+    @property
+    def kind(self) -> PartClass:
+        """The class that the part is nearest to as it stands."""
+        standing = self.mesh.copy()
+        standing.apply_transform(placement(*self.placement))
+        return part_class(standing)
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A scan of a part: a pattern with its keys.
+
+    Attributes:
+        part: The part.
+        kind: Its class.
+        pattern: The pattern of that class.
+        keys: Keys of `[path]` that are not at their defaults, by name.
+        speed_mm_s: The speed of the line over the surface.
+        step_s: Time from one location to the next.
+    """
+
+    part: Part
+    kind: str
+    pattern: str
+    keys: tuple[tuple[str, float], ...]
+    speed_mm_s: float
+    step_s: float
+
+    def path(self) -> ScanPath:
+        """Return the path.
+
+        Raises:
+            PlannerError: The pattern cannot be laid on the part.
+        """
+        cell, layout = self.part.cell, StripLayout(**dict(self.keys))
+        waypoints = mesh_waypoints(self.part.mesh, self.kind, self.pattern, cell.T_TW, cell.probe, layout)
+        return at_scan_speed(waypoints, self.speed_mm_s, self.step_s, cell.probe.stand_off_mm, cell.probe.line_width_mm)
+
+    def scan(self, name: str) -> Scan:
+        """Return the scan that `text` describes.
+
+        Raises:
+            PlannerError: The pattern cannot be laid on the part, or the part does not fit the table.
+        """
+        cell, limits = self.part.cell, Limits()
+        check_it_fits_the_table(self.part.mesh, cell)
+        return Scan(
+            name,
+            cell,
+            load_bodies(cell.probe, cell.T_FS, DEFAULT_ARM),
+            measured(self.part.mesh, self.kind, cell.T_TW)[0],
+            self.part.mesh,
+            self.part.file,
+            self.path(),
+            ValueFunction(),
+            limits,
+            default_weights(limits),
+        )
+
+    def text(self, folder: Path) -> str:
+        """Return the scan file, commented, for a folder."""
+        part, cell = self.part, self.part.cell
+        mesh_file = Path(_relative(part.file.resolve(), folder.resolve())).as_posix()
+        unit = "" if part.unit == "mm" else f'unit = "{part.unit}"             # of the lengths in the mesh file\n'
+        keys = "".join(f"{name} = {value:g}\n" for name, value in self.keys)
+        x, y, z = (float(side) for side in part.mesh.extents)
+        return _TEXT.format(
+            mesh=json.dumps(mesh_file),
+            size=f"{x:.1f} x {y:.1f} x {z:.1f}",
+            arm=DEFAULT_ARM,
+            table=_list(cell.T_BT[:3, 3]),
+            placed=", ".join(f"{value:g}" for value in part.placement),
+            stand_off=cell.probe.stand_off_mm,
+            nearest=cell.probe.nearest_mm,
+            farthest=cell.probe.farthest_mm,
+            line=cell.probe.line_width_mm,
+            unit=unit,
+            kind=self.kind,
+            pattern=self.pattern,
+            patterns=", ".join(sorted(CLASS_OF_PATTERN)),
+            keys=keys,
+            speed=self.speed_mm_s,
+            step=self.step_s,
+        )
+
+
+_TEXT = """\
+# A scan of {mesh}, {size} mm, written by `python -m planner new-scan`.
+# Lengths in mm, angles in deg; placements are x y z yaw pitch roll (ZYZ, as in the robot language).
+# Every key is explained in docs/own-part.md. To plan it: python -m planner plan THIS_FILE --out build/plan
+
+[cell]                    # an estimate: write your own cell here
+arm = "{arm}"
+table_in_base = [{table}, 0, 0, 0]   # middle of the table top in the arm's base, its axis upright
+probe_on_flange = [0, 0, 100, 0, 0, 0]   # the beam continues the axis of joint 6
+# The frame of the mesh file on the table: middle of the part on the table's axis, its lowest point on the top.
+workpiece_on_table = [{placed}]
+
+[cell.probe]
+stand_off_mm = {stand_off:g}        # from the laser's exit to the surface
+nearest_mm = {nearest:g}          # the measuring range
+farthest_mm = {farthest:g}
+line_width_mm = {line:g}        # of the laser line at the stand-off
+
+[workpiece]
+mesh = {mesh}
+{unit}class = "{kind}"
+
+[path]
+pattern = "{pattern}"        # one of {patterns}; or file = "path.csv", see docs/path-files.md
+overlap = 0.2             # share of the line that neighbouring strips have in common
+{keys}scan_speed_mm_s = {speed:g}    # of the line over the surface
+time_step_s = {step:g}       # from one location to the next
+
+[limits]
+table_speed_deg_s = 40
+table_acceleration_deg_s2 = 100
+"""
+
+
+def drafts(part: Part, kind: str | None = None, pattern: str | None = None) -> Iterator[Draft]:
+    """Yield scans of a part, the one that fits best first; `kind` and `pattern` are what was asked for.
+
+    Raises:
+        PlannerError: What was asked for cannot be laid on the part.
+    """
+    first = kind or part.kind.kind
+    if pattern is not None:
+        kinds = [(class_of(first, pattern), pattern)]
+    else:
+        kinds = [(first, FIRST_PATTERN[first])]
+        if kind is None:
+            # From above everything can be scanned in some way.
+            kinds += [(other, FIRST_PATTERN[other]) for other in ("block", "cylinder", "sphere") if other != first]
+    for each, laid in kinds:
+        for keys in _layouts(each, part):
+            try:
+                yield _timed(Draft(part, each, laid, keys, _speed_mm_s(part), _STEP_S))
+            except PlannerError:
+                if kind is not None or pattern is not None:
+                    raise
+
+
+def _layouts(kind: str, part: Part) -> Iterator[tuple[tuple[str, float], ...]]:
+    if kind == "cylinder":
+        height_mm = float(np.ptp(np.asarray(part.mesh.vertices) @ part.cell.T_TW[2, :3]))
+        margins = [margin for margin in _BOTTOM_MARGINS_MM if margin < height_mm] or [_BOTTOM_MARGINS_MM[0]]
+        yield from ((("bottom_margin_mm", margin),) for margin in margins)
+    elif kind == "sphere":
+        yield from ((("lowest_polar_deg", polar),) for polar in _POLAR_ENDS_DEG)
+    elif kind == "mould":
+        yield (("wall_margin_mm", 15.0),)
+    else:
+        yield ()
+
+
+def _speed_mm_s(part: Part) -> float:
+    """Return a speed at which the table can undo a turn around the part."""
+    length_mm, width_mm, _ = sorted(part.mesh.extents, reverse=True)
+    return float(f"{min(_FASTEST_MM_S, _FASTEST_RAD_S * 0.25 * (length_mm + width_mm)):.2g}")
+
+
+def _timed(draft: Draft) -> Draft:
+    """Return the draft with a time step, and if need be a lower speed, that give neither few locations nor many."""
+    duration_s = (draft.path().count - 1) * draft.step_s
+    step_s = min(max(_STEP_S, duration_s / _MOST), _LONGEST_STEP_S, max(duration_s / _FEWEST, _SHORTEST_STEP_S))
+    slower = min(1.0, duration_s / (_FEWEST * step_s))
+    return replace(draft, step_s=float(f"{step_s:.2g}"), speed_mm_s=float(f"{slower * draft.speed_mm_s:.2g}"))
+
+
+def _relative(file: Path, folder: Path) -> Path:
+    """Return the way from a folder to a file; the whole path where there is none, as between two drives."""
+    try:
+        return Path(os.path.relpath(file, folder))
+    except ValueError:
+        return file
+
+
+def _list(numbers: FloatArray) -> str:
+    return ", ".join(f"{number:g}" for number in numbers)

@@ -1,0 +1,133 @@
+"""`python -m planner new-scan`: write a scan file for a mesh, with a pattern that can be planned."""
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.cell.beam_check import beam_faults, beam_warning
+from planner.cell.scan import check_it_fits_the_table
+from planner.cell.scan_draft import Draft, Part, drafts
+from planner.commands import options
+from planner.defaults import DEFAULT_ANGLES, DEFAULT_PLANNER
+from planner.errors import PlannerError, WorkpieceError
+from planner.geometry.mesh import load_mesh
+from planner.planning.arm_motion import ArmMotion
+from planner.planning.plan import Plan
+from planner.planning.planners import PLANNERS
+from planner.planning.problem import Problem
+from planner.planning.scan_planning import ScanPlans, plan_scan
+from planner.planning.verification import verify
+from planner.progress import progress_line
+from protocol.whole_file import write_whole
+
+# The table may be this far from its plan, either way, and must still meet nothing forbidden.
+_OFF_DEG = 0.5
+# A pattern at whose locations more of the beams meet nothing is tried last.
+_FEW_MISSES = 0.1
+
+
+class Drafted(NamedTuple):
+    """A scan that can be planned, and its plans."""
+
+    draft: Draft
+    plans: ScanPlans
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the scan file, print what was assumed, and return the exit status."""
+    out: Path = arguments.out or Path(f"{arguments.mesh.stem}.toml")
+    if out.exists():
+        raise PlannerError(f"{out}: exists already; remove it, or write to another file with --out")
+    mesh = load_mesh(arguments.mesh, arguments.unit, options.say, progress_line("mesh", sys.stderr))
+    part = Part(mesh, arguments.mesh, arguments.unit or "mm", arguments.up)
+    try:
+        check_it_fits_the_table(mesh, part.cell)
+        drafted = first_that_plans(part, arguments.kind, arguments.pattern, out.stem)
+    except WorkpieceError as error:
+        raise WorkpieceError(f"{arguments.mesh}: {error}") from error
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(out, drafted.draft.text(out.parent))
+    except OSError as error:
+        raise PlannerError(f"{out}: the scan cannot be written there ({error.strerror or error})") from error
+    sys.stdout.write(summary(drafted, out))
+    return 0
+
+
+def first_that_plans(part: Part, kind: str | None, pattern: str | None, name: str) -> Drafted:
+    """Return the first scan of a part that has a plan which the arm can follow, with room beside it.
+
+    Patterns that measure something at nearly all of their locations come first.
+
+    Raises:
+        WorkpieceError: There is none.
+    """
+    reasons = []
+    for draft in sorted(drafts(part, kind, pattern), key=lambda each: _share_missed(each) > _FEW_MISSES):
+        plans = plan_scan(
+            draft.scan(name),
+            "best",
+            DEFAULT_ANGLES,
+            PLANNERS[DEFAULT_PLANNER],
+            lambda label: progress_line(label, sys.stderr),
+            compiled=DEFAULT_PLANNER,
+        )
+        if plans.best is not None and _has_room(*plans.best):
+            return Drafted(draft, plans)
+        reason = plans.comparison.refusal if plans.best is None else "its plan touches what is forbidden"
+        reasons.append(f"{draft.pattern}{_layout(draft)}: {reason}")
+    tried = "; ".join(reasons) or "no pattern meets the part"
+    raise WorkpieceError(
+        f"no pattern can be scanned in the default cell ({tried}); name a --pattern, turn the part with --up,"
+        " or write a path file, see docs/own-part.md"
+    )
+
+
+def _share_missed(draft: Draft) -> float:
+    """Return the share of locations at which nothing can be measured."""
+    faults = beam_faults(draft.path().T_WS, draft.part.mesh, draft.part.cell.probe)
+    return float(np.mean(faults.away | faults.misses | faults.beyond))
+
+
+def _has_room(problem: Problem, plan: Plan, arm: ArmMotion) -> bool:
+    """Return whether the arm can follow, and nothing forbidden is met where the table is a little beside its plan."""
+    beside = (replace(plan, angles_deg=plan.angles_deg + off_deg) for off_deg in (-_OFF_DEG, 0.0, _OFF_DEG))
+    return arm.step is None and all(verify(problem, each).is_executable for each in beside)
+
+
+def _layout(draft: Draft) -> str:
+    return "".join(f", {name} {value:g}" for name, value in draft.keys)
+
+
+def summary(drafted: Drafted, out: Path) -> str:
+    """Return what was written, what was assumed, and what to do next, for people."""
+    draft, part = drafted.draft, drafted.draft.part
+    assert drafted.plans.best is not None
+    problem, plan, _ = drafted.plans.best
+    x, y, z = (float(side) for side in part.mesh.extents)
+    cell, placed = part.cell, part.placement
+    warning = beam_warning(draft.path().T_WS, part.mesh, cell.probe)
+    lines = [
+        f"{out}: {part.kind.name}, {x:.1f} x {y:.1f} x {z:.1f} mm; pattern {draft.pattern}{_layout(draft)} on the class"
+        f" {draft.kind}, {problem.map.location_count} locations, {problem.step_count * problem.step_s:g} s",
+        f"assumed: lengths in {part.unit} (--unit)",
+        f"         the file's {part.up} axis points up (--up)",
+        "         the part stands in the middle of the table: workpiece_on_table ="
+        f" [{', '.join(f'{value:g}' for value in placed)}]",
+        f"         arm {cell.arm.name} and the cell of the shipped scans (arm, table_in_base, probe_on_flange)",
+        f"         stand-off {cell.probe.stand_off_mm:g} mm, measuring range {cell.probe.nearest_mm:g} to"
+        f" {cell.probe.farthest_mm:g} mm, laser line {cell.probe.line_width_mm:g} mm",
+        f"checked: a plan exists in {plan.configuration}",
+    ]
+    if warning is not None:
+        lines.append(f"note:    {warning}")
+    folder = Path("build") / out.stem
+    lines += [
+        f"next:    python -m planner plan {out} --out {folder}",
+        f"         python -m planner run {folder / 'plan.json'} --port emulator:// --arm-away --out {folder / 'run'}",
+    ]
+    return "\n".join(lines) + "\n"

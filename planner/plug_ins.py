@@ -1,0 +1,66 @@
+"""Planners and value factors that other packages bring, found by their entry points.
+
+A package declares them in its pyproject.toml:
+
+    [project.entry-points."seventh_axis.planners"]
+    mine = "my_package.my_module:my_planner"
+
+Nothing of a package is imported before its plug-in is asked for by name.
+"""
+
+from collections.abc import Sequence
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from planner.errors import PlannerError
+from protocol.data_file import did_you_mean
+
+PLANNER_GROUP = "seventh_axis.planners"
+FACTOR_GROUP = "seventh_axis.factors"
+_WHAT = {PLANNER_GROUP: "planner", FACTOR_GROUP: "factor"}
+
+
+class PlugInError(PlannerError):
+    """A plug-in that is not there, cannot be loaded, or does not keep to its interface."""
+
+
+def plug_in_names(group: str) -> list[str]:
+    """Return the names of the installed plug-ins of a group, sorted."""
+    return sorted({point.name for point in entry_points(group=group)})
+
+
+def load_plug_in(group: str, name: str, others: Sequence[str] = ()) -> Any:  # noqa: ANN401  # checked by the caller
+    """Return what the entry point of that name refers to.
+
+    Args:
+        group: PLANNER_GROUP or FACTOR_GROUP.
+        name: The plug-in.
+        others: Names that are allowed as well, for the message.
+
+    Raises:
+        PlugInError: There is none of that name, two packages have one, or it cannot be imported.
+    """
+    what, points = _WHAT[group], tuple(entry_points(group=group, name=name))
+    if not points:
+        known = [*others, *plug_in_names(group)]
+        allowed = (
+            f"; there are {', '.join(known)}" if known else f"; no package with the entry point {group} is installed"
+        )
+        raise PlugInError(f"{what} {name!r}: is not known{allowed}{did_you_mean(name, known)}")
+    if len({point.value for point in points}) > 1:
+        packages = " and ".join(sorted(_package(point) for point in points))
+        raise PlugInError(f"{what} {name!r}: {packages} both bring one of that name; uninstall one of them")
+    try:
+        return points[0].load()
+    except (Exception, SystemExit) as error:
+        raise failure(group, name, f"cannot be loaded from {_package(points[0])}", error) from error
+
+
+def failure(group: str, name: str, problem: str, error: BaseException) -> PlugInError:
+    """Return the error that says in one line what a plug-in raised."""
+    message = " ".join(str(error).split())
+    return PlugInError(f"{_WHAT[group]} {name!r}: {problem}: {type(error).__name__}{': ' if message else ''}{message}")
+
+
+def _package(point: EntryPoint) -> str:
+    return point.value if point.dist is None else f"{point.dist.name} ({point.value})"
