@@ -1,4 +1,4 @@
-"""What programs use of the planner, from a scan to maps, to a plan, to a verified run; `import planner` gives it all."""
+"""What programs use of the planner, from a scan to maps, to a plan, to a verified run; see `import planner`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

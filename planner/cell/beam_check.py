@@ -10,7 +10,7 @@ from planner.cell.cell import Probe
 from planner.geometry.ray_casting import RayCaster
 
 # Rays over the laser line: it may pass over a hole in its middle.
-_RAYS = 7
+_RAYS = 31
 
 
 class BeamFaults(NamedTuple):
