@@ -183,7 +183,7 @@ mesh = {mesh}
 {unit}class = "{kind}"
 
 [path]
-pattern = "{pattern}"        # one of {patterns}; or file = "path.csv", see docs/path-files.md
+pattern = "{pattern}"        # one of {patterns}; or file = "path.csv", see docs/own-part.md
 overlap = 0.2             # share of the line that neighbouring strips have in common
 {keys}scan_speed_mm_s = {speed:g}    # of the line over the surface
 time_step_s = {step:g}       # from one location to the next
