@@ -40,7 +40,7 @@ def test_a_plan_is_one_value_that_cannot_change_and_can_be_saved_and_run(tmp_pat
 
 def test_where_there_is_no_plan_the_answer_says_why(tmp_path: Path) -> None:
     text = (Path(planner.__file__).parent / "scans" / "cylinder.toml").read_text(encoding="utf-8")
-    (tmp_path / "scan.toml").write_text(text.replace("[570, 0, 120,", "[900, 0, 120,"), encoding="utf-8")
+    (tmp_path / "scan.toml").write_text(text.replace("[570, 0, 120,", "[1500, 0, 120,"), encoding="utf-8")
     answer = planner.plan(planner.load_scan(tmp_path / "scan.toml"), configuration="LEFTY-ABOVE-NOFLIP", angle_count=60)
     assert isinstance(answer, planner.NoPlan)
     assert answer.infeasibility is planner.Infeasibility.BLOCKED_LOCATION

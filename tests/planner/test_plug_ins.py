@@ -32,7 +32,7 @@ def short(problem):
 
 def infinite(problem):
     plan = rotate_when_blocked(problem)
-    return dataclasses.replace(plan, speeds_deg_s=plan.speeds_deg_s * np.inf)
+    return dataclasses.replace(plan, speeds_deg_s=np.full_like(plan.speeds_deg_s, np.inf))
 
 def lying(problem):
     plan = rotate_when_blocked(problem)

@@ -123,10 +123,11 @@ def test_what_cannot_be_scanned_is_refused_in_one_sentence(
 def test_a_part_that_the_arm_cannot_reach_is_refused_with_what_was_tried(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    trimesh.creation.cylinder(radius=240.0, height=700.0).export(tmp_path / "part.stl")
-    assert new_scan(tmp_path / "part.stl") is None
+    trimesh.creation.cylinder(radius=40.0, height=800.0).export(tmp_path / "part.stl")
+    assert new_scan(tmp_path / "part.stl", "--pattern", "raster") is None
     (line,) = capsys.readouterr().err.splitlines()
-    assert "no pattern can be scanned in the default cell (rings, bottom_margin_mm 60: " in line
+    assert "no pattern can be scanned in the default cell (raster: " in line
+    assert "a scan location has no allowed table angle" in line
     assert not (tmp_path / "part.toml").exists()
 
 
