@@ -105,7 +105,8 @@ def plan(
         PlannerError: A name is not known, or the planner returned something that is not an answer.
     """
     chosen: Planner = planner_named(planner) if isinstance(planner, str) else checked(_name(planner), planner)
-    plans = plan_scan(scan, configuration, angle_count, chosen, lambda _label: None, start_angle_deg)
+    shipped = planner if isinstance(planner, str) else ""
+    plans = plan_scan(scan, configuration, angle_count, chosen, lambda _label: None, start_angle_deg, shipped)
     if plans.best is None:
         return plans.comparison.farthest[1]
     return PlannedScan(scan, *plans.best, dict(plans.comparison.outcomes))
