@@ -36,9 +36,9 @@ def beam_faults(T_WS: FloatArray, mesh: trimesh.Trimesh, probe: Probe) -> BeamFa
     shape = len(T_WS), _RAYS
     ahead_mm = rays.first_hits(starts.reshape(-1, 3), beams).distances_mm.reshape(shape)
     behind_mm = rays.first_hits(starts.reshape(-1, 3), -beams).distances_mm.reshape(shape)
-    met: BoolArray = np.isfinite(ahead_mm).any(axis=1)
-    in_range: BoolArray = ((ahead_mm >= probe.nearest_mm) & (ahead_mm <= probe.farthest_mm)).any(axis=1)
-    is_behind: BoolArray = np.isfinite(behind_mm).any(axis=1)
+    met = np.asarray(np.isfinite(ahead_mm).any(axis=1))
+    in_range = np.asarray(((ahead_mm >= probe.nearest_mm) & (ahead_mm <= probe.farthest_mm)).any(axis=1))
+    is_behind = np.asarray(np.isfinite(behind_mm).any(axis=1))
     return BeamFaults(away=~met & is_behind, misses=~met & ~is_behind, beyond=met & ~in_range)
 
 

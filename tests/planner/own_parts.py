@@ -28,7 +28,9 @@ def moved(mesh: trimesh.Trimesh, x: float, y: float, z: float) -> trimesh.Trimes
 
 def lying(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """The mesh with its z axis along y."""
-    mesh.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2, (1.0, 0.0, 0.0)))
+    T = np.eye(4)
+    T[:3, :3] = (1, 0, 0), (0, 0, 1), (0, -1, 0)
+    mesh.apply_transform(T)
     return mesh
 
 

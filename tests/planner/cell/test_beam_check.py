@@ -8,7 +8,8 @@ import trimesh
 
 from planner.cell.beam_check import beam_warning
 from planner.cell.cell import Probe, placement
-from planner.cell.scan import load_scan, shipped_scans
+from planner.cell.scan import load_scan
+from planner.defaults import shipped_scans
 
 PART = trimesh.creation.box((100.0, 100.0, 100.0))
 GOOD = placement(0.0, 0.0, 200.0, 0.0, 180.0, 0.0)

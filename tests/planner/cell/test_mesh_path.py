@@ -11,6 +11,7 @@ from planner.cell.workpiece import Cylinder, Mould, Sphere
 from planner.errors import PathError
 from planner.geometry.ray_casting import RayCaster
 from tests.planner.own_parts import OWN_PARTS
+from tests.planner.parts import joined
 
 PROBE, LAYOUT = Probe(), StripLayout()
 
@@ -52,7 +53,7 @@ def test_a_probe_stays_above_a_step_as_long_as_it_is_near() -> None:
     high.apply_translation((50.0, 0.0, 30.0))
     x = np.arange(-90.0, 91.0, 2.0)
     waypoints = np.array([placement(each, 0.0, 300.0, 0.0, 180.0, 0.0) for each in x])
-    heights = following(waypoints, trimesh.util.concatenate((low, high)), 150.0)[:, 2, 3]
+    heights = following(waypoints, joined(low, high), 150.0)[:, 2, 3]
     np.testing.assert_allclose(heights[x < -20.5], 170.0, atol=1e-6)
     np.testing.assert_allclose(heights[x > -19.5], 210.0, atol=1e-6)
 
@@ -63,7 +64,7 @@ def test_between_two_bodies_the_probe_goes_straight_from_one_to_the_other() -> N
     right.apply_translation((60.0, 0.0, 20.0))
     x = np.arange(-60.0, 61.0, 2.0)
     waypoints = np.array([placement(each, 0.0, 300.0, 0.0, 180.0, 0.0) for each in x])
-    heights = following(waypoints, trimesh.util.concatenate((left, right)), 150.0)[:, 2, 3]
+    heights = following(waypoints, joined(left, right), 150.0)[:, 2, 3]
     between = np.abs(x) < 30.0
     assert np.ptp(np.diff(heights[between])) < 1e-9
     assert heights.min() == pytest.approx(170.0)
