@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from planner.arrays import FloatArray
 from planner.cell.bodies import load_bodies
 from planner.cell.cell import Cell, placement
 from planner.cell.mesh_path import CLASS_OF_PATTERN, class_of, measured, mesh_waypoints
@@ -135,63 +134,62 @@ class Draft:
 
     def text(self, folder: Path) -> str:
         """Return the scan file, commented, for a folder."""
-        part, cell = self.part, self.part.cell
-        mesh_file = Path(_relative(part.file.resolve(), folder.resolve())).as_posix()
-        unit = "" if part.unit == "mm" else f'unit = "{part.unit}"             # of the lengths in the mesh file\n'
-        keys = "".join(f"{name} = {value:g}\n" for name, value in self.keys)
+        part, cell, limits = self.part, self.part.cell, Limits()
+        mesh = json.dumps(_relative(part.file.resolve(), folder.resolve()).as_posix())
         x, y, z = (float(side) for side in part.mesh.extents)
-        return _TEXT.format(
-            mesh=json.dumps(mesh_file),
-            size=f"{x:.1f} x {y:.1f} x {z:.1f}",
-            arm=DEFAULT_ARM,
-            table=_list(cell.T_BT[:3, 3]),
-            placed=", ".join(f"{value:g}" for value in part.placement),
-            stand_off=cell.probe.stand_off_mm,
-            nearest=cell.probe.nearest_mm,
-            farthest=cell.probe.farthest_mm,
-            line=cell.probe.line_width_mm,
-            unit=unit,
-            kind=self.kind,
-            pattern=self.pattern,
-            patterns=", ".join(sorted(CLASS_OF_PATTERN)),
-            keys=keys,
-            speed=self.speed_mm_s,
-            step=self.step_s,
-        )
+        unit = [] if part.unit == "mm" else [("unit", json.dumps(part.unit), "of the lengths in the mesh file")]
+        sections: dict[str, list[tuple[str, str, str]]] = {
+            "cell": [
+                ("arm", json.dumps(DEFAULT_ARM), "the cell of the shipped scans, an estimate: write yours here"),
+                ("table_in_base", _list(*cell.T_BT[:3, 3], 0, 0, 0), "middle of the table top, its axis upright"),
+                ("probe_on_flange", _list(*cell.T_FS[:3, 3], 0, 0, 0), "the beam continues the axis of joint 6"),
+                ("workpiece_on_table", _list(*part.placement), "middle on the table's axis, lowest point on the top"),
+            ],
+            "cell.probe": [
+                ("stand_off_mm", f"{cell.probe.stand_off_mm:g}", "from the laser's exit to the surface"),
+                ("nearest_mm", f"{cell.probe.nearest_mm:g}", "start of the measuring range"),
+                ("farthest_mm", f"{cell.probe.farthest_mm:g}", "end of the measuring range"),
+                ("line_width_mm", f"{cell.probe.line_width_mm:g}", "width of the laser line at the stand-off"),
+            ],
+            "workpiece": [
+                ("mesh", mesh, "the way there from this file"),
+                *unit,
+                ("class", json.dumps(self.kind), _CLASSES),
+            ],
+            "path": [
+                ("pattern", json.dumps(self.pattern), f"or {', '.join(sorted({*CLASS_OF_PATTERN} - {self.pattern}))}"),
+                ("overlap", f"{StripLayout.overlap:g}", "share of the line that neighbouring strips have in common"),
+                *((name, f"{value:g}", _KEYS[name]) for name, value in self.keys),
+                ("scan_speed_mm_s", f"{self.speed_mm_s:g}", "speed of the line over the surface"),
+                ("time_step_s", f"{self.step_s:g}", "time from one location to the next"),
+            ],
+            "limits": [
+                ("table_speed_deg_s", f"{limits.speed_deg_s:g}", "maximum speed of the table"),
+                ("table_acceleration_deg_s2", f"{limits.acceleration_deg_s2:g}", "maximum acceleration of the table"),
+            ],
+        }
+        head = _HEAD.format(mesh=mesh, size=f"{x:.1f} x {y:.1f} x {z:.1f}")
+        return head + "".join(_section(name, rows) for name, rows in sections.items())
 
 
-_TEXT = """\
+_CLASSES = "block, cylinder, mould or sphere: the shape that patterns are laid on"
+_KEYS = {
+    "bottom_margin_mm": "minimum height of the line's middle: below it the probe would touch the table",
+    "lowest_polar_deg": "end of the strips, from the pole: lower down the table is in the way",
+    "wall_margin_mm": "distance of the strips' ends from the walls",
+}
+_HEAD = """\
 # A scan of {mesh}, {size} mm, written by `python -m planner new-scan`.
 # Lengths in mm, angles in deg; placements are x y z yaw pitch roll (ZYZ, as in the robot language).
-# Every key is explained in docs/own-part.md. To plan it: python -m planner plan THIS_FILE --out build/plan
-
-[cell]                    # an estimate: write your own cell here
-arm = "{arm}"
-table_in_base = [{table}, 0, 0, 0]   # middle of the table top in the arm's base, its axis upright
-probe_on_flange = [0, 0, 100, 0, 0, 0]   # the beam continues the axis of joint 6
-# The frame of the mesh file on the table: middle of the part on the table's axis, its lowest point on the top.
-workpiece_on_table = [{placed}]
-
-[cell.probe]
-stand_off_mm = {stand_off:g}        # from the laser's exit to the surface
-nearest_mm = {nearest:g}          # the measuring range
-farthest_mm = {farthest:g}
-line_width_mm = {line:g}        # of the laser line at the stand-off
-
-[workpiece]
-mesh = {mesh}
-{unit}class = "{kind}"
-
-[path]
-pattern = "{pattern}"        # one of {patterns}; or file = "path.csv", see docs/own-part.md
-overlap = 0.2             # share of the line that neighbouring strips have in common
-{keys}scan_speed_mm_s = {speed:g}    # of the line over the surface
-time_step_s = {step:g}       # from one location to the next
-
-[limits]
-table_speed_deg_s = 40
-table_acceleration_deg_s2 = 100
+# In place of a pattern, [path] takes file = "path.csv". Patterns and path files: docs/own-part.md.
 """
+_COMMENT_COLUMN = 46
+
+
+def _section(name: str, rows: list[tuple[str, str, str]]) -> str:
+    """Return a table of a TOML file: a line for each key, value and comment."""
+    lines = [f"{key} = {value}".ljust(_COMMENT_COLUMN) + f"  # {comment}" for key, value, comment in rows]
+    return "\n".join(("", f"[{name}]", *lines, ""))
 
 
 def drafts(part: Part, kind: str | None = None, pattern: str | None = None) -> Iterator[Draft]:
@@ -252,5 +250,5 @@ def _relative(file: Path, folder: Path) -> Path:
         return file
 
 
-def _list(numbers: FloatArray) -> str:
-    return ", ".join(f"{number:g}" for number in numbers)
+def _list(*numbers: float) -> str:
+    return f"[{', '.join(f'{number:.10g}' for number in numbers)}]"

@@ -33,7 +33,8 @@ def parser() -> argparse.ArgumentParser:
     top: argparse.ArgumentParser = Parser(
         prog=program_name("planner"),
         description="Plan the motion of a rotary table under a scanning robot arm.",
-        epilog="example: python -m planner map mould --out build/mould",
+        epilog="examples: python -m planner new-scan part.stl --out part.toml;"
+        " python -m planner map mould --out build/mould",
     )
     commands = top.add_subparsers(title="commands", metavar="COMMAND", dest="command", required=True)
     _add_map(commands)

@@ -4,6 +4,7 @@ import argparse
 import sys
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import NamedTuple
 
 import numpy as np
@@ -117,7 +118,7 @@ def summary(drafted: Drafted, out: Path) -> str:
         f"assumed: lengths in {part.unit} (--unit)",
         f"         the file's {part.up} axis points up (--up)",
         "         the part stands in the middle of the table: workpiece_on_table ="
-        f" [{', '.join(f'{value:g}' for value in placed)}]",
+        f" [{', '.join(f'{value:.10g}' for value in placed)}]",
         f"         arm {cell.arm.name} and the cell of the shipped scans (arm, table_in_base, probe_on_flange)",
         f"         stand-off {cell.probe.stand_off_mm:g} mm, measuring range {cell.probe.nearest_mm:g} to"
         f" {cell.probe.farthest_mm:g} mm, laser line {cell.probe.line_width_mm:g} mm",
@@ -127,7 +128,8 @@ def summary(drafted: Drafted, out: Path) -> str:
         lines.append(f"note:    {warning}")
     folder = Path("build") / out.stem
     lines += [
-        f"next:    python -m planner plan {out} --out {folder}",
-        f"         python -m planner run {folder / 'plan.json'} --port emulator:// --arm-away --out {folder / 'run'}",
+        f"next:    python -m planner plan {quote(str(out))} --out {quote(str(folder))}",
+        f"         python -m planner run {quote(str(folder / 'plan.json'))} --port emulator:// --arm-away"
+        f" --out {quote(str(folder / 'run'))}",
     ]
     return "\n".join(lines) + "\n"

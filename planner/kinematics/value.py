@@ -76,7 +76,7 @@ def plug_in_factor(name: str) -> UserFactor:
         count = len(poses.clearance_mm)
         try:
             rates = np.asarray(rate(poses), dtype=np.float64)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise failure(FACTOR_GROUP, name, "failed", error) from error
         if rates.shape != (count,):
             raise PlugInError(f"factor {name!r}: returned an array of shape {rates.shape}; it must be ({count},)")

@@ -1,18 +1,18 @@
 """Planners by name: those that are shipped, and those of other packages, whose answers are checked."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from planner.arrays import FloatArray
 from planner.defaults import PLANNER_NAMES
-from planner.planning.plan import NoPlan, Outcome, Plan, Planner, path_cost
+from planner.planning.plan import Infeasibility, NoPlan, Outcome, Pause, Plan, Planner, path_cost
 from planner.planning.plan_check import plan_fault
 from planner.planning.planners import PLANNERS
 from planner.planning.problem import Problem
 from planner.plug_ins import PLANNER_GROUP, PlugInError, failure, load_plug_in, plug_in_names
+from planner.reasons import Reason
 
 
 def planner_names() -> list[str]:
@@ -43,31 +43,41 @@ def checked(name: str, function: Callable[[Problem], Any]) -> Planner:
     def plan(problem: Problem) -> Outcome:
         try:
             outcome = function(problem)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise failure(PLANNER_GROUP, name, "failed", error) from error
-        if isinstance(outcome, NoPlan):
-            return replace(outcome, planner=name)
-        if not isinstance(outcome, Plan):
+        if not isinstance(outcome, NoPlan | Plan):
             raise PlugInError(f"planner {name!r}: returned {_kind(outcome)}; it must return a Plan or a NoPlan")
-        fault = plan_fault(problem, outcome)
-        if fault is not None:
-            raise PlugInError(f"planner {name!r}: returned no valid plan: {fault}")
-        return _restated(problem, name, outcome)
+        try:
+            if isinstance(outcome, NoPlan):
+                return _restated_refusal(name, outcome)
+            return _restated_plan(problem, name, outcome)
+        except PlugInError:
+            raise
+        except Exception as error:  # a field that is not of its type
+            raise failure(PLANNER_GROUP, name, f"returned no valid {type(outcome).__name__}", error) from error
 
     return plan
 
 
-def _restated(problem: Problem, name: str, plan: Plan) -> Plan:
+def _restated_refusal(name: str, no_plan: NoPlan) -> NoPlan:
+    """Return the refusal as values of its types."""
+    location = None if no_plan.location is None else int(no_plan.location)
+    joint = None if no_plan.joint is None else Reason(no_plan.joint)
+    return NoPlan(name, Infeasibility(no_plan.infeasibility), location, joint)
+
+
+def _restated_plan(problem: Problem, name: str, plan: Plan) -> Plan:
     """Return the plan with what is not for the planner to say, in arrays that nobody else can change."""
+    fault = plan_fault(problem, plan)
+    if fault is not None:
+        raise PlugInError(f"planner {name!r}: returned no valid Plan: {fault}")
     motion = _frozen(plan.angles_deg), _frozen(plan.speeds_deg_s), _frozen(plan.accelerations_deg_s2)
-    return Plan(
-        name,
-        str(problem.map.metadata.get("configuration", "")),
-        problem.step_s,
-        *motion,
-        cost=path_cost(problem, *motion, plan.pauses),
-        pauses=tuple(plan.pauses),
+    pauses = tuple(
+        Pause(int(pause.step), float(pause.from_angle_deg), float(pause.to_angle_deg)) for pause in plan.pauses
     )
+    configuration = str(problem.map.metadata.get("configuration", ""))
+    cost = path_cost(problem, *motion, pauses)
+    return Plan(name, configuration, problem.step_s, *motion, cost=cost, pauses=pauses)
 
 
 def _frozen(array: FloatArray) -> FloatArray:

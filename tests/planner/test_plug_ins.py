@@ -15,6 +15,7 @@ QUICK = ["--angles", "60", "--configuration", "LEFTY-ABOVE-NOFLIP"]
 MODULE = """
 import dataclasses
 import numpy as np
+from planner.planning.plan import NoPlan
 from planner.planning.rotate_when_blocked import rotate_when_blocked
 
 def good(problem):
@@ -37,6 +38,20 @@ def infinite(problem):
 def lying(problem):
     plan = rotate_when_blocked(problem)
     return dataclasses.replace(plan, angles_deg=plan.angles_deg + np.arange(len(plan.angles_deg)) ** 2, pauses=())
+
+def pausing(problem):
+    plan = rotate_when_blocked(problem)
+    return dataclasses.replace(plan, pauses=("later",))
+
+def exiting(problem):
+    raise SystemExit(4)
+
+def vague(problem):
+    return NoPlan("?", "because")
+
+def with_texts(problem):
+    plan = rotate_when_blocked(problem)
+    return dataclasses.replace(plan, angles_deg=["a"] * len(plan.angles_deg))
 
 number = 7
 
@@ -62,6 +77,10 @@ PLANNERS = {
     "short": "own_things:short",
     "infinite": "own_things:infinite",
     "lying": "own_things:lying",
+    "pausing": "own_things:pausing",
+    "exiting": "own_things:exiting",
+    "vague": "own_things:vague",
+    "texts": "own_things:with_texts",
     "number": "own_things:number",
     "absent": "own_things:absent",
     "no_module": "there_is_none:plan",
@@ -72,9 +91,13 @@ FACTORS = {name: f"own_things:{name}" for name in ("half", "north", "scalar", "l
 BROKEN = {
     "failing": "planner 'failing': failed: ZeroDivisionError: division by zero",
     "nothing": "planner 'nothing': returned None; it must return a Plan or a NoPlan",
-    "short": "planner 'short': returned no valid plan: angles_deg has shape (94,); it must be (95,)",
-    "infinite": "planner 'infinite': returned no valid plan: speeds_deg_s holds a value that is not a finite number",
-    "lying": "planner 'lying': returned no valid plan: angle, speed and acceleration of step 0 contradict one another",
+    "short": "planner 'short': returned no valid Plan: angles_deg has shape (94,); it must be (95,)",
+    "infinite": "planner 'infinite': returned no valid Plan: speeds_deg_s holds a value that is not a finite number",
+    "lying": "planner 'lying': returned no valid Plan: angle, speed and acceleration of step 0 contradict one another",
+    "pausing": "planner 'pausing': returned no valid Plan: AttributeError",
+    "exiting": "planner 'exiting': failed: SystemExit: 4",
+    "vague": "planner 'vague': returned no valid NoPlan: ValueError: 'because' is not a valid Infeasibility",
+    "texts": "planner 'texts': returned no valid Plan: ValueError",
     "number": "planner 'number': is a value of type int; it must be a function from a Problem to a Plan",
     "absent": "planner 'absent': cannot be loaded from own-things (own_things:absent): AttributeError",
     "no_module": "planner 'no_module': cannot be loaded from own-things (there_is_none:plan): ModuleNotFoundError",
