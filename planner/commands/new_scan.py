@@ -22,7 +22,7 @@ from planner.planning.planners import PLANNERS
 from planner.planning.problem import Problem
 from planner.planning.scan_planning import ScanPlans, plan_scan
 from planner.planning.verification import verify
-from planner.progress import progress_line
+from protocol.progress import progress_line
 from protocol.whole_file import write_whole
 
 # The table may be this far from its plan, either way, and must still meet nothing forbidden.
