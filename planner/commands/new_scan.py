@@ -13,7 +13,7 @@ from planner.cell.beam_check import beam_faults, beam_warning
 from planner.cell.scan import check_it_fits_the_table
 from planner.cell.scan_draft import Draft, Part, drafts
 from planner.commands import options
-from planner.defaults import DEFAULT_ANGLES, DEFAULT_PLANNER
+from planner.defaults import DEFAULT_ANGLES, DEFAULT_PLANNER, TOLERANCE_DEG
 from planner.errors import PlannerError, WorkpieceError
 from planner.geometry.mesh import load_mesh
 from planner.planning.arm_motion import ArmMotion
@@ -25,8 +25,8 @@ from planner.planning.verification import verify
 from protocol.progress import progress_line
 from protocol.whole_file import write_whole
 
-# The table may be this far from its plan, either way, and must still meet nothing forbidden.
-_OFF_DEG = 0.5
+# A table that is beside its plan by as much as a run allows, and a little more, must still meet nothing forbidden.
+_OFF_DEG = TOLERANCE_DEG + 0.05
 # A pattern at whose locations more of the beams meet nothing is tried last.
 _FEW_MISSES = 0.1
 
@@ -68,7 +68,7 @@ def first_that_plans(part: Part, kind: str | None, pattern: str | None, name: st
         WorkpieceError: There is none.
     """
     reasons = []
-    for draft in sorted(drafts(part, kind, pattern), key=lambda each: _share_missed(each) > _FEW_MISSES):
+    for draft in sorted(drafts(part, kind, pattern), key=lambda each: share_missed(each) > _FEW_MISSES):
         plans = plan_scan(
             draft.scan(name),
             "best",
@@ -77,7 +77,7 @@ def first_that_plans(part: Part, kind: str | None, pattern: str | None, name: st
             lambda label: progress_line(label, sys.stderr),
             compiled=DEFAULT_PLANNER,
         )
-        if plans.best is not None and _has_room(*plans.best):
+        if plans.best is not None and has_room(*plans.best):
             return Drafted(draft, plans)
         reason = plans.comparison.refusal if plans.best is None else "its plan touches what is forbidden"
         reasons.append(f"{draft.pattern}{_layout(draft)}: {reason}")
@@ -88,13 +88,13 @@ def first_that_plans(part: Part, kind: str | None, pattern: str | None, name: st
     )
 
 
-def _share_missed(draft: Draft) -> float:
+def share_missed(draft: Draft) -> float:
     """Return the share of locations at which nothing can be measured."""
     faults = beam_faults(draft.path().T_WS, draft.part.mesh, draft.part.cell.probe)
     return float(np.mean(faults.away | faults.misses | faults.beyond))
 
 
-def _has_room(problem: Problem, plan: Plan, arm: ArmMotion) -> bool:
+def has_room(problem: Problem, plan: Plan, arm: ArmMotion) -> bool:
     """Return whether the arm can follow, and nothing forbidden is met where the table is a little beside its plan."""
     beside = (replace(plan, angles_deg=plan.angles_deg + off_deg) for off_deg in (-_OFF_DEG, 0.0, _OFF_DEG))
     return arm.step is None and all(verify(problem, each).is_executable for each in beside)

@@ -1,6 +1,7 @@
 """From a mesh that somebody brings to a verified plan: `new-scan`, `plan`, `run`."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,12 @@ import trimesh
 import planner
 from planner.__main__ import main
 from planner.cell.scan_draft import Part, drafts
+from planner.commands.new_scan import first_that_plans, has_room, share_missed
 from planner.defaults import AXES, PATTERN_NAMES
 from planner.geometry.mesh import load_mesh
+from planner.kinematics.arm import Arm
+from planner.map.config_map import ConfigurationMap
+from planner.planning.arm_motion import ArmMotion
 from tests.planner.own_parts import OWN_PARTS
 
 MESHES = Path(__file__).parents[1] / "meshes"
@@ -53,6 +58,26 @@ def test_three_commands_lead_from_a_mesh_to_a_verified_run(
     assert main([*printed[1].split(), "--configuration", "LEFTY-ABOVE-NOFLIP"]) == 0
     assert main(printed[2].split()) == 0
     assert "\nverified: within " in capsys.readouterr().out
+
+
+def test_a_pattern_that_measures_little_is_not_the_first_choice() -> None:
+    bracket = Part(OWN_PARTS["bracket"].mesh, Path("part.stl"))
+    first = next(iter(drafts(bracket)))
+    assert first.pattern == "rings"
+    assert share_missed(first) > 0.4  # between base and wall there is nothing
+    chosen = first_that_plans(bracket, None, None, "part").draft
+    assert share_missed(chosen) < 0.1
+
+
+@pytest.mark.parametrize(("angle_deg", "has"), [(100.0, False), (100.4, True), (250.0, False), (249.6, True)])
+def test_a_plan_has_room_where_the_table_may_be_a_little_beside_it(angle_deg: float, has: bool) -> None:
+    values = np.ones((5, 36))
+    values[2, :10], values[2, 26:] = 0.0, 0.0  # free from 100 to 250 degrees
+    problem = planner.Problem(ConfigurationMap(values), step_s=0.5)
+    standing = planner.make_plan(problem, "still", np.full(5, angle_deg), np.zeros(5), np.zeros(4))
+    arm = ArmMotion(Arm.load(), np.zeros((5, 6)), np.zeros((5, 6)), np.zeros(6, dtype=np.int64))
+    assert has_room(problem, standing, arm) is has
+    assert not has_room(problem, standing, replace(arm, step=1))
 
 
 def test_the_file_says_the_same_as_the_scan_that_was_checked(tmp_path: Path) -> None:
