@@ -241,6 +241,6 @@ def test_a_control_channel_on_which_nobody_answers_is_one_line(
     words = ["--port", "emulator://", "--control", str(control), "--out", str(tmp_path / "run")]
     assert main(["run", str(plan_file), *words]) == 2
     said = capsys.readouterr().err.splitlines()[-1]
-    assert said.startswith(f"{control}: ")
+    assert said.startswith(f"planner run: {control}: ")
     assert "--control socket" in said
     assert names_in(tmp_path / "run") == set()
