@@ -29,6 +29,7 @@ class Command(NamedTuple):
 COMMANDS = {
     "table": Command("emulator.__main__", "run the emulator: a rotary table behind a virtual serial port"),
     "control": Command("emulator.control_client", "control a running emulator: trigger, state, faults"),
+    "new-scan": Command("planner.__main__", "write a scan file for a mesh", by_name=True),
     "map": Command("planner.__main__", "compute and draw a scan's configuration map", by_name=True),
     "plan": Command("planner.__main__", "plan the table's motion along a scan", by_name=True),
     "run": Command("planner.__main__", "carry out a plan on a table, and verify the motion", by_name=True),
