@@ -37,9 +37,13 @@ class TomlTable:
     def __contains__(self, key: str) -> bool:
         return key in self._values
 
+    def name_of(self, key: str) -> str:
+        """Return the name of `key` with the tables that it is in, such as `cell.probe.stand_off_mm`."""
+        return f"{self._prefix}{key}"
+
     def refuse(self, key: str, allowed: str) -> ScanFileError:
-        """Return the error that says that the value of `key` is not what is allowed."""
-        name = f"{self.file}: {self._prefix}{key}"
+        """Return the error that states the value of `key` and what is allowed."""
+        name = f"{self.file}: {self.name_of(key)}"
         if key not in self._values:
             misspelt = self._misspelt(key)
             first = "" if misspelt is None else f"{self._prefix}{misspelt} is not a known key; did you mean {key}? "

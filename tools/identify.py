@@ -110,9 +110,8 @@ def parser() -> Parser:
         prog=program_name("tools.identify"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     commands = parser.add_subparsers(required=True)
-    recorder = commands.add_parser(
-        "record", help="move a table and record its answers (within a quarter of a turn, by default)"
-    )
+    summary = "move a table and record its replies (by default within a quarter of a turn)"
+    recorder = commands.add_parser("record", help=summary, description=summary)
     recorder.add_argument("--port", required=True, metavar="URL", help="/dev/ttyUSB0, socket://host:7000, emulator://")
     recorder.add_argument("--out", required=True, type=Path, metavar="FILE", help="CSV file to write")
     recorder.add_argument("--baud", type=int, default=9600, help="baud rate (default: 9600)")
@@ -126,7 +125,8 @@ def parser() -> Parser:
     recorder.add_argument("--config", type=Path, help="known constants of the table: the tick rate of its controller")
     recorder.add_argument("--seed", type=int, default=0, help="random seed of the swings (default: 0)")
     recorder.set_defaults(run=_record)
-    fitter = commands.add_parser("fit", help="estimate the constants of the recorded table")
+    summary = "estimate the constants of the recorded table"
+    fitter = commands.add_parser("fit", help=summary, description=summary)
     fitter.add_argument("recording", type=Path, help="a CSV of `record`, of the emulator's trace, or of a drive")
     fitter.add_argument(
         "--out", required=True, type=Path, metavar="FILE", help="TOML file to write; the report is written beside it"

@@ -170,7 +170,7 @@ class ValueFunction:
         default = cls()
         on = frozenset(name for name in FACTORS if table.choice(name, ("on", "off"), "on") == "on")
         gamma = table.numbers("gamma", 6, default.gamma)
-        numbers: dict[str, Any] = {name: table.number(name, getattr(default, name)) for name in _NUMBERS}
+        numbers: dict[str, Any] = {name: table.number(name, getattr(default, name), at_least=0.0) for name in _NUMBERS}
         own = table.texts("user_factors")
         if len(set(own)) < len(own):
             raise table.refuse("user_factors", "a list of different names")

@@ -174,7 +174,7 @@ def _wrong_line(profile: Profile) -> Iterator[str]:
 def _wrong_motion(profile: Profile) -> Iterator[str]:
     count_deg, reach_deg, tolerance = profile.table.counts_per_deg, profile.motion.reach_deg, profile.tolerance
     if count_deg <= 0:
-        yield "table.counts_per_deg is 0; it must be greater"
+        yield "table.counts_per_deg is 0; it must be above 0"
     elif reach_deg >= profile.range_deg:
         yield (
             f"motion.reach_deg is {reach_deg:g}; with table.counts_per_deg {count_deg:g} "
