@@ -1,6 +1,7 @@
 # make demo    set up and run the main job
 # make test    set up and run the tests
-# make lint    format, lint and type checks
+# make lint    format, lint, type and prose checks
+# make docs    build the docs site into build/site
 # make mutants plant 200 small faults and see which of them the tests do not find (half an hour)
 
 PYTHON ?= python3
@@ -9,7 +10,7 @@ BIN := $(VENV)/bin
 # The variable, unlike the option, also pins what builds the package.
 INSTALL := PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test lint mutants clean
+.PHONY: demo test lint docs mutants clean
 
 demo: $(VENV)/demo.stamp
 	$(BIN)/python -m tools.demo --out build/demo
@@ -22,6 +23,9 @@ lint: $(VENV)/test.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+docs: $(VENV)/test.stamp
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict -f docs/site/mkdocs.yml
 
 mutants: $(VENV)/test.stamp
 	$(BIN)/python -m tools.mutation_score --count 200
