@@ -1,0 +1,1 @@
+"""The prose linter: plain technical English in docs and help texts."""
