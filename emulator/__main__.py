@@ -27,7 +27,7 @@ _EXAMPLE = """example:
   picocom -b 9600 --echo --imap crcrlf ./table     (or: python -m serial.tools.miniterm --eol CR ./table 9600)
 
 The first line on stdout is the port that a client opens: the device, or a URL for pyserial. SIGUSR1 is the probe's
-trigger; Ctrl-C or SIGTERM end the stand-in with status 0.
+trigger; Ctrl-C or SIGTERM end the emulator with status 0.
 """
 
 _MOST_DIGITS = 30
@@ -74,24 +74,24 @@ def parser() -> Parser:
     """Return the parser of the command line."""
     parser = Parser(
         prog=program_name("emulator"),
-        description="A stand-in rotary table behind a virtual serial port.",
+        description="A rotary table's emulator behind a virtual serial port.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
     add("--pty", action="store_true", help="open a pseudo-terminal and print its device")
     add("--link", metavar="PATH", type=Path, help="a symbolic link to the pseudo-terminal, removed at the end")
-    add("--tcp", metavar="[HOST:]PORT", type=_address, help="listen on TCP and print the URL; port 0 is any free one")
-    add("--rfc2217", metavar="[HOST:]PORT", type=_address, help="the same by RFC 2217, which carries the baud rate")
-    add("--baud", metavar="N", type=int, help="baud rate of the table (default 9600); 0: bytes take no time")
-    add("--time-scale", metavar="X", type=_time_scale, default=1.0, help="simulated seconds in a real one (default 1)")
-    add("--decimals", metavar="N", type=int, help="decimals of angles in replies (default 1)")
-    add("--strict-table1", action="store_true", help="no error replies: the protocol as the paper prints it")
-    add("--config", metavar="FILE", type=Path, help="TOML file with the constants of the table that differ")
-    add("--trigger-hz", metavar="F", type=_rate, default=0.0, help="rate of the probe's trigger (default 0: none)")
-    add("--control", metavar="PATH", type=Path, help="a Unix socket for python -m emulator.control_client")
+    add("--tcp", metavar="[HOST:]PORT", type=_address, help="listen on TCP and print the URL; 0 picks a free port")
+    add("--rfc2217", metavar="[HOST:]PORT", type=_address, help="listen by RFC 2217, which transmits the baud rate")
+    add("--baud", metavar="N", type=int, help="baud rate of the table (default: 9600); 0: bytes take no time")
+    add("--time-scale", metavar="X", type=_time_scale, default=1.0, help="simulated time over real time (default: 1)")
+    add("--decimals", metavar="N", type=int, help="decimal places of angles in replies (default: 1)")
+    add("--strict-table1", action="store_true", help="no error replies: the protocol as in Table 1 of the paper")
+    add("--config", metavar="FILE", type=Path, help="TOML file with overrides of the default constants")
+    add("--trigger-hz", metavar="F", type=_rate, default=0.0, help="rate of the probe's trigger (default: 0, none)")
+    add("--control", metavar="PATH", type=Path, help="path of the Unix socket for python -m emulator.control_client")
     add("--trace", metavar="FILE", type=Path, help="record every tick in a .csv or .npz file")
-    add("--seed", metavar="N", type=_seed, default=0, help="seed of all that is left to chance (default 0)")
+    add("--seed", metavar="N", type=_seed, default=0, help="random seed (default: 0)")
     return parser
 
 

@@ -1,4 +1,4 @@
-"""Talk to the control channel of a running stand-in: `python -m emulator.control_client PATH COMMAND`."""
+"""Control a running emulator by its control channel: `python -m emulator.control_client PATH COMMAND`."""
 
 import argparse
 import json
@@ -38,11 +38,11 @@ def parser() -> Parser:
     """Return the parser of the command line."""
     parser = Parser(
         prog=program_name("emulator.control_client"),
-        description="Act on a running stand-in apart from the wire.",
+        description="Control a running emulator.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("path", metavar="PATH", type=Path, help="the socket that the stand-in was given with --control")
+    parser.add_argument("path", metavar="PATH", type=Path, help="the socket of the emulator's option --control")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, command in COMMANDS.items():
         subparser = commands.add_parser(name, help=command.help, description=command.help)

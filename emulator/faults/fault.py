@@ -16,9 +16,9 @@ class FaultError(ValueError):
     """A fault that cannot be; the message says what is allowed."""
 
 
-ByteProbability = Annotated[float, 0.0, 1.0, "of each byte"]
+ByteProbability = Annotated[float, 0.0, 1.0, "probability of each byte"]
 EdgeProbability = Annotated[float, 0.0, 1.0, "of each edge"]
-Delay = Annotated[float, 0.0, 3600.0, "by how long"]
+Delay = Annotated[float, 0.0, 3600.0, "delay in s"]
 LineDirection = Annotated[int, -1, 1, "1: towards the table, -1: towards the client, 0 (default): both"]
 
 
@@ -45,7 +45,7 @@ class LateReplies(Fault, kind="delay"):
 class HalfReply(Fault, kind="half-reply"):
     """The next reply ends before its end."""
 
-    bytes: Annotated[int, 0, 32, "that are sent of it"]
+    bytes: Annotated[int, 0, 32, "number of bytes that are sent"]
 
 
 class LateReply(Fault, kind="late-reply"):
@@ -65,7 +65,7 @@ class HangUp(Fault, kind="hang-up"):
 class WrongBaud(Fault, kind="wrong-baud"):
     """The table listens and talks at another rate."""
 
-    baud: Annotated[int, 50, 4_000_000, "of it"]
+    baud: Annotated[int, 50, 4_000_000, "baud rate"]
 
 
 class Stall(Fault, kind="stall"):
@@ -81,13 +81,13 @@ class ExtraLoad(Fault, kind="extra-load"):
 class SupplySag(Fault, kind="supply-sag"):
     """The motor's supply falls."""
 
-    supply_V: Annotated[float, 0.0, 100.0, "that is left"]
+    supply_V: Annotated[float, 0.0, 100.0, "remaining voltage"]
 
 
 class StuckPwm(Fault, kind="stuck-pwm"):
     """The bridge keeps one duty."""
 
-    duty: Annotated[float, -1.0, 1.0, "that it keeps"]
+    duty: Annotated[float, -1.0, 1.0, "duty"]
 
 
 class OneSided(Fault, kind="one-sided"):
@@ -119,8 +119,8 @@ class MissedTrigger(Fault, kind="missed-trigger"):
 class BouncedTrigger(Fault, kind="bounced-trigger"):
     """Each trigger edge is followed by others."""
 
-    edges: Annotated[int, 1, 100, "that follow"]
-    within_s: Annotated[float, 0.001, 10.0, "after it, spread by chance"]
+    edges: Annotated[int, 1, 100, "number of additional edges"]
+    within_s: Annotated[float, 0.001, 10.0, "interval of the additional edges in s, at random times"]
 
 
 STRIKES_ONCE = (HalfReply, LateReply)

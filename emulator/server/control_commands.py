@@ -1,4 +1,4 @@
-"""The control channel: what a person or a test may do to the stand-in besides talking to it on the wire.
+"""The control channel: commands to a running emulator beside the serial line.
 
 A request is one line of JSON, `{"command": NAME, PARAMETER: NUMBER, ...}`; its answer is one line, `{"ok": true, ...}`
 or `{"ok": false, "error": SENTENCE}`. `control` carries them.
@@ -60,7 +60,7 @@ def _fault_command(kind: str) -> Command:
 COMMANDS: Mapping[str, Command] = {
     "trigger": Command("latch the encoder, as the probe's signal does", (), lambda stand, _: stand.trigger()),
     "state": Command(
-        "show the table from inside: positions, speeds, motor, queues",
+        "show the state of the table: positions, speeds, motor, queues",
         (),
         lambda stand, _: {**stand.table.status()._asdict(), "time_scale": stand.time_scale},
     ),
@@ -83,14 +83,14 @@ COMMANDS: Mapping[str, Command] = {
     ),
     "reset": Command("cut the table's power and switch it on again", (), lambda stand, _: stand.table.reset()),
     "preset": Command(
-        "reset the table, and let its counter begin elsewhere than at 0",
-        (Parameter("count", -(2**31), 2**31 - 1, "where the counter begins", whole=True),),
+        "reset the table, and start the counter at COUNT",
+        (Parameter("count", -(2**31), 2**31 - 1, "initial value of the counter", whole=True),),
         lambda stand, given: stand.table.reset(int(given["count"])),
     ),
     "clear-faults": Command(
-        "end all faults, and forget those to come", (), lambda stand, _: stand.table.clear_faults()
+        "end all faults, and cancel the scheduled ones", (), lambda stand, _: stand.table.clear_faults()
     ),
-    "quit": Command("end the stand-in as SIGTERM does", (), lambda stand, _: stand.quit()),
+    "quit": Command("end the emulator, as SIGTERM does", (), lambda stand, _: stand.quit()),
 } | {f"fault-{kind}": _fault_command(kind) for kind in KINDS}
 """Every verb, in one place: the server runs them, the command-line client shows them."""
 

@@ -50,7 +50,7 @@ def _add_map(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     parser = commands.add_parser(
         "map",
         help="compute and draw a scan's configuration map",
-        description="Rate every location of a scan at every table angle, and say why where the arm cannot be.",
+        description="Rate every location of a scan at every table angle, and explain forbidden poses.",
         epilog="example: python -m planner map mould --configuration LEFTY-ABOVE-NOFLIP --out build/mould",
     )
     _add_scan_option(parser)
@@ -90,7 +90,7 @@ def _add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         description="Stream a plan to the table at a port; exit status 1 when the motion deviated from the plan.",
         epilog="example: python -m planner run build/cylinder/plan.json --port /dev/ttyUSB0 --out build/cylinder/run",
     )
-    parser.add_argument("plan", metavar="PLAN.json", type=Path, help="a plan that python -m planner plan has written")
+    parser.add_argument("plan", metavar="PLAN.json", type=Path, help="a plan from python -m planner plan")
     parser.add_argument(
         "--port",
         metavar="URL",
@@ -107,24 +107,24 @@ def _add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         type=positive_number,
         default=1.0,
         metavar="S",
-        help="wait this long for a reply (default 1)",
+        help="timeout of a reply in s (default: 1)",
     )
     parser.add_argument(
         "--lead", type=number(-1.0, 1.0), default=LEAD_S, metavar="S",
-        help="send commands ahead by the encoder's lag behind the reference: 0.0035 for the stand-in (default 0)",
+        help="send commands ahead by the encoder's lag behind the reference: 0.0035 for the emulator (default: 0)",
     )  # fmt: skip
     _add_lag(parser)
     parser.add_argument(
         "--tolerance", type=positive_number, default=TOLERANCE_DEG, metavar="DEG",
-        help="what the encoder may deviate at a location (default %(default)s)",
+        help="allowed encoder deviation at a location in deg (default: %(default)s)",
     )  # fmt: skip
     _add_run_on(parser)
     parser.add_argument(
         "--arm-away",
         action="store_true",
-        help="the arm is drawn back until the table stands at the start: any way there is free",
+        help="no collision check on the approach: the arm is drawn back until the table is at the start",
     )
-    _add_stand_in(parser)
+    _add_emulator(parser)
 
 
 def _add_scan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -137,17 +137,17 @@ def _add_scan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     )
     _add_scan_option(parser)
     parser.add_argument("--mesh", type=Path, metavar="FILE", help="replace the workpiece by this mesh")
-    parser.add_argument("--unit", choices=tuple(MILLIMETRES), help="unit of length in --mesh (default mm)")
+    parser.add_argument("--unit", choices=tuple(MILLIMETRES), help="unit of length in --mesh (default: mm)")
     parser.add_argument(
         "--port", metavar="URL", default="emulator://",
-        help="emulator:// for a table in simulated time (the default), or a stand-in's port along with --control",
+        help="emulator:// for a table in simulated time (the default), or an emulator's port with --control",
     )  # fmt: skip
-    _add_stand_in(parser)
+    _add_emulator(parser)
     _add_wire(parser)
     _add_lag(parser)
     parser.add_argument(
         "--rate", type=positive_number, default=PROFILES_HZ, metavar="HZ",
-        help="profiles a second (default %(default)g)",
+        help="laser profiles per second (default: %(default)g)",
     )  # fmt: skip
     _add_run_on(parser)
     _add_map_option(parser, configuration="best")
@@ -156,7 +156,7 @@ def _add_scan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     )
     parser.add_argument("--xyz", action="store_true", help="write cloud.xyz as well")
     parser.add_argument(
-        "--seed", type=whole_number(0, 2**31), default=0, metavar="N", help="chooses all noise (default 0)"
+        "--seed", type=whole_number(0, 2**31), default=0, metavar="N", help="random seed of the noise (default: 0)"
     )
     parser.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="folder for cloud.ply, scan.json and report.html"
@@ -170,7 +170,7 @@ def _add_show(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
         description="Write a page that shows a run, with everything in it: map, paths, profile, deviations, commands.",
         epilog="example: python -m planner show build/cylinder/run",
     )
-    parser.add_argument("folder", metavar="DIR", type=Path, help="what python -m planner run has written")
+    parser.add_argument("folder", metavar="DIR", type=Path, help="output folder of python -m planner run")
     parser.add_argument("--out", metavar="FILE", type=Path, help=f"the page (default: {REPORT_FILE} in DIR)")
 
 
@@ -231,19 +231,19 @@ def _add_map_option(parser: argparse.ArgumentParser, configuration: str) -> None
         type=whole_number(8, 36_000),
         default=DEFAULT_ANGLES,
         metavar="COUNT",
-        help="table angles over one turn (default %(default)s)",
+        help="table angles over one turn (default: %(default)s)",
     )
 
 
 def _add_wire(parser: argparse.ArgumentParser) -> None:
     """Add what the line to the table is like."""
-    parser.add_argument("--baud", type=whole_number(0, 1_000_000), default=9600, metavar="N", help="default 9600")
+    parser.add_argument("--baud", type=whole_number(0, 1_000_000), default=9600, metavar="N", help="baud rate (default: 9600)")
     parser.add_argument(
         "--decimals",
         type=whole_number(1, 6),
         default=1,
         metavar="N",
-        help="places after the point on the wire (default 1)",
+        help="decimal places on the wire (default: 1)",
     )
 
 
@@ -254,21 +254,21 @@ def _add_run_on(parser: argparse.ArgumentParser) -> None:
         type=positive_number,
         default=RUN_ON_DEG,
         metavar="DEG",
-        help="maximum angle that the table runs on if the line dies, where the limits allow it (default %(default)g)",
+        help="maximum angle that the table runs on if the line dies, where the limits allow it (default: %(default)g)",
     )
 
 
-def _add_stand_in(parser: argparse.ArgumentParser) -> None:
-    """Add what is to be known of a stand-in at the port."""
+def _add_emulator(parser: argparse.ArgumentParser) -> None:
+    """Add time scale and control channel of an emulator at the port."""
     parser.add_argument(
         "--time-scale",
         type=positive_number,
         default=1.0,
         metavar="X",
-        help="that of the stand-in at --port, if it is not 1",
+        help="time scale of the emulator at --port (default: 1)",
     )
     parser.add_argument(
-        "--control", type=Path, metavar="PATH", help="the control channel of a stand-in at --port, to see inside it"
+        "--control", type=Path, metavar="PATH", help="control channel of the emulator at --port, for its reference and true angle"
     )
 
 
@@ -276,5 +276,5 @@ def _add_lag(parser: argparse.ArgumentParser) -> None:
     """Add the encoder's lag behind the reference, which the wire does not show."""
     parser.add_argument(
         "--lag", type=number(0.0, 1.0), default=LAG_S, metavar="S",
-        help="lag of the encoder behind the table's reference (default %(default)s, that of the emulator)",
+        help="lag of the encoder behind the table's reference in s (default: %(default)s, for the emulator)",
     )  # fmt: skip

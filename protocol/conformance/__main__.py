@@ -59,7 +59,7 @@ def parser() -> Parser:
     """Return the parser of the command line."""
     parser = Parser(
         prog=program_name("protocol.conformance"),
-        description="Hold a rotary table against the specification, clause by clause.",
+        description="Test a rotary table against the specification, clause by clause.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -69,22 +69,22 @@ def parser() -> Parser:
         "--profile",
         metavar="FILE",
         type=Path,
-        help="TOML file of what is known of this table (default: the stand-in's)",
+        help="TOML file with the properties of the table (default: the emulator's)",
     )
     add(
         "--case",
         metavar="PREFIX",
         action="append",
         default=[],
-        help="only cases whose id begins so (with $ at the end: is so); may be repeated",
+        help="cases whose id starts with PREFIX ($ at the end: exact id); may be repeated",
     )
-    add("--control", metavar="PATH", type=Path, help="the control channel of a running stand-in")
-    add("--out", metavar="DIR", type=Path, help="where record.json, report.html and junit.xml go")
-    add("--junit", metavar="FILE", type=Path, help="where JUnit's XML goes instead")
-    add("--seed", metavar="N", type=int, default=0, help="seed of what cases leave to chance (default 0)")
-    add("--yes", action="store_true", help="the table may be moved as the profile says: do not ask")
-    add("--list", action="store_true", help="show the cases and what each needs, and end")
-    add("--replay", metavar="FILE", type=Path, help="send the wire of a record.json again, and show where answers part")
+    add("--control", metavar="PATH", type=Path, help="control channel of a running emulator")
+    add("--out", metavar="DIR", type=Path, help="output folder of record.json, report.html and junit.xml")
+    add("--junit", metavar="FILE", type=Path, help="other file for the JUnit XML")
+    add("--seed", metavar="N", type=int, default=0, help="random seed of the cases (default: 0)")
+    add("--yes", action="store_true", help="move the table within the profile's limits without asking")
+    add("--list", action="store_true", help="list the cases with their needs, and exit")
+    add("--replay", metavar="FILE", type=Path, help="send the bytes of a record.json again, and list differing replies")
     return parser
 
 
