@@ -10,6 +10,9 @@ BIN := $(VENV)/bin
 # The variable, unlike the option, also pins what builds the package.
 INSTALL := PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
+# Prose: American spelling, and the words of docs/glossary.md.
+SPELLED := --builtin clear,rare,en-GB_to_en-US --ignore-words .ci/names README.md CONTRIBUTING.md CHANGELOG.md docs/*.md
+
 .PHONY: demo test lint docs mutants clean
 
 demo: $(VENV)/demo.stamp
@@ -23,6 +26,8 @@ lint: $(VENV)/test.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/codespell $(SPELLED)
+	$(BIN)/python -m tools.prose
 
 docs: $(VENV)/test.stamp
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict -f docs/site/mkdocs.yml

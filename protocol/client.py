@@ -58,7 +58,7 @@ class TableClient:
             port = open_serial_port(url, baud, timeout_s)
         except (OSError, ValueError) as error:
             raise PortError(
-                f"cannot open {url} at {baud} baud: {error}; check the name, the rights and the table"
+                f"cannot open {url} at {baud} baud: {error}; check the port name, permissions (dialout group) and power"
             ) from error
         return cls(port, timeout_s, decimals)
 

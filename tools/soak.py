@@ -172,7 +172,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the named soaks; return 1 when something did not hold."""
     parser = Parser(
         prog=program_name("tools.soak"),
-        description="Run the stand-in for long, and look whether all that must hold still holds.",
+        description="Run the emulator for a long time, and check the invariants.",
         epilog="example: python -m tools.soak noise --share 0.01",
     )
     parser.add_argument("name", nargs="+", choices=SOAKS)

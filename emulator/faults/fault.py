@@ -1,4 +1,4 @@
-"""What can go wrong with a table: the faults by name, and the numbers that each takes.
+"""The faults that can be injected into a table: by name, and the numbers that each takes.
 
 The same names and numbers are used in a configuration file, on the control channel and by `Table.inject`. When a fault
 holds is in `schedule`; what it does is in `line_faults`, `drive_faults` and `trigger_faults`.
@@ -13,11 +13,11 @@ from protocol.bench import Fault
 
 
 class FaultError(ValueError):
-    """A fault that cannot be; the message says what is allowed."""
+    """A fault that cannot be; the message states what is allowed."""
 
 
 ByteProbability = Annotated[float, 0.0, 1.0, "probability of each byte"]
-EdgeProbability = Annotated[float, 0.0, 1.0, "of each edge"]
+EdgeProbability = Annotated[float, 0.0, 1.0, "probability of each edge"]
 Delay = Annotated[float, 0.0, 3600.0, "delay in s"]
 LineDirection = Annotated[int, -1, 1, "1: towards the table, -1: towards the client, 0 (default): both"]
 
@@ -30,46 +30,46 @@ class Drop(Fault, kind="drop"):
 
 
 class Flip(Fault, kind="flip"):
-    """A bit of a byte turns over on the line."""
+    """A bit of a byte is flipped on the line."""
 
     probability: ByteProbability
     direction: LineDirection = 0
 
 
 class LateReplies(Fault, kind="delay"):
-    """All replies come later."""
+    """All replies are delayed."""
 
     seconds: Delay
 
 
 class HalfReply(Fault, kind="half-reply"):
-    """The next reply ends before its end."""
+    """Truncate the next reply."""
 
     bytes: Annotated[int, 0, 32, "number of bytes that are sent"]
 
 
 class LateReply(Fault, kind="late-reply"):
-    """The next reply comes late, and those after it behind it."""
+    """Delay the next reply; later replies queue behind it."""
 
     seconds: Delay
 
 
 class Silence(Fault, kind="silence"):
-    """The table carries out what it hears and says nothing."""
+    """Commands are carried out, and no reply is sent."""
 
 
 class HangUp(Fault, kind="hang-up"):
-    """The port goes away; it comes back when the fault ends."""
+    """The port disappears; it comes back when the fault ends."""
 
 
 class WrongBaud(Fault, kind="wrong-baud"):
-    """The table listens and talks at another rate."""
+    """The table receives and sends at another baud rate."""
 
     baud: Annotated[int, 50, 4_000_000, "baud rate"]
 
 
 class Stall(Fault, kind="stall"):
-    """Something holds the table."""
+    """The table is blocked."""
 
 
 class ExtraLoad(Fault, kind="extra-load"):
@@ -79,13 +79,13 @@ class ExtraLoad(Fault, kind="extra-load"):
 
 
 class SupplySag(Fault, kind="supply-sag"):
-    """The motor's supply falls."""
+    """The supply voltage drops."""
 
     supply_V: Annotated[float, 0.0, 100.0, "remaining voltage"]
 
 
 class StuckPwm(Fault, kind="stuck-pwm"):
-    """The bridge keeps one duty."""
+    """The bridge applies a constant duty."""
 
     duty: Annotated[float, -1.0, 1.0, "duty"]
 
@@ -107,11 +107,11 @@ class SwappedEncoder(Fault, kind="swapped-encoder"):
 
 
 class DeadEncoder(Fault, kind="dead-encoder"):
-    """The encoder counts nothing."""
+    """The encoder does not count."""
 
 
 class MissedTrigger(Fault, kind="missed-trigger"):
-    """Trigger edges are not seen."""
+    """Trigger edges are lost."""
 
     probability: EdgeProbability
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from emulator.faults.parameter import Parameter
 
-TIME_SCALE = Parameter("time_scale", 1e-3, 1e6, "simulated seconds in a real second")
+TIME_SCALE = Parameter("time_scale", 1e-3, 1e6, "time scale: simulated time over real time")
 
 
 class Clock:

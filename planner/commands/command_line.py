@@ -237,7 +237,9 @@ def _add_map_option(parser: argparse.ArgumentParser, configuration: str) -> None
 
 def _add_wire(parser: argparse.ArgumentParser) -> None:
     """Add what the line to the table is like."""
-    parser.add_argument("--baud", type=whole_number(0, 1_000_000), default=9600, metavar="N", help="baud rate (default: 9600)")
+    parser.add_argument(
+        "--baud", type=whole_number(0, 1_000_000), default=9600, metavar="N", help="baud rate (default: 9600)"
+    )
     parser.add_argument(
         "--decimals",
         type=whole_number(1, 6),
@@ -268,7 +270,10 @@ def _add_emulator(parser: argparse.ArgumentParser) -> None:
         help="time scale of the emulator at --port (default: 1)",
     )
     parser.add_argument(
-        "--control", type=Path, metavar="PATH", help="control channel of the emulator at --port, for its reference and true angle"
+        "--control",
+        type=Path,
+        metavar="PATH",
+        help="control channel of the emulator at --port, for its reference and true angle",
     )
 
 

@@ -52,14 +52,14 @@ class RunOptions(NamedTuple):
 
 
 class Duration(NamedTuple):
-    """How long the table was busy: by the clock of its port, and by the one on the wall."""
+    """The duration of a run: in the time of its port, and in real time."""
 
     table_s: float
     wall_s: float
 
     def __str__(self) -> str:
         times_real = self.table_s / self.wall_s
-        return f"{self.table_s:.1f} s of the table took {self.wall_s:.2f} s: {times_real:.3g} times real time"
+        return f"{self.table_s:.1f} s of table time in {self.wall_s:.2f} s: {times_real:.3g} times real time"
 
 
 class Finished(NamedTuple):

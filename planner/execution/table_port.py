@@ -46,7 +46,7 @@ def open_port(url: str, baud: int, timeout_s: float, time_scale: float = 1.0) ->
         port: Port = open_serial_port(url, baud, timeout_s)
     except (OSError, ValueError) as error:
         raise PortError(
-            f"cannot open {url} at {baud} baud: {error}; check the name, the rights and the table"
+            f"cannot open {url} at {baud} baud: {error}; check the port name, permissions (dialout group) and power"
         ) from error
     if time_scale != 1.0:
         port.clock = ScaledClock(WallClock(), time_scale)  # type: ignore[attr-defined] # where clients look for one

@@ -16,7 +16,7 @@ RULES = load_rules()
     [
         ("Start the stand-in first.", "stand-in"),
         ("The table says where it is.", "says"),
-        ("This is no number.", "is no "),
+        ("This is no number.", "is no"),
         ("It prints the\ngreatest speed.", "the greatest"),
         ("Hold it against tables of another make.", "tables of another make"),
         ("The value is foretold.", "foretold"),

@@ -35,7 +35,7 @@ def _run(options: argparse.Namespace, benches: Mapping[str, Callable[..., None]]
 def _parser() -> Parser:
     parser = Parser(
         prog=program_name("tools.bench"),
-        description="Measure this machine's figures, each beside a peer or the truth.",
+        description="Measure this machine's figures, compared with a reference.",
         epilog="examples:\n  python -m tools.bench emulator map\n  python -m tools.bench identify --pty",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

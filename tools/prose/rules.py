@@ -8,7 +8,9 @@ from typing import NamedTuple
 from protocol.data_file import read_toml
 
 VOCABULARY = Path(__file__).with_name("vocabulary.toml")
-_CODE = re.compile(r"^```(?s:.*?)^```|(?:^\n|\A)(?:^ {4,}[^\n]*\n)+|`[^`]*`|\[\S*\.md\]|\]\([^)]*\)", re.MULTILINE)
+_CODE = re.compile(
+    r"^```(?s:.*?)^```|(?:^\n|\A)(?:^ {4,}[^\n]*\n)+|`[^`]*`|\[\S*\.md\]\([^)]*\)|\]\([^)]*\)", re.MULTILINE
+)
 """What is not prose in Markdown: blocks and spans of code, and the targets of links."""
 
 

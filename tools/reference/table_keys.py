@@ -5,7 +5,7 @@ from dataclasses import Field, fields, is_dataclass
 from typing import Any, get_type_hints
 
 from emulator.config.table_config import DEFAULT_FILE, load_config
-from emulator.faults.fault import KINDS, SCHEDULE
+from emulator.faults.fault import KINDS, help_of, parameters_of
 from emulator.faults.parameter import Parameter
 from tools.reference.keys import Key, comments, key_page
 from tools.reference.markdown import code, table
@@ -50,15 +50,12 @@ def _allowed(kind: type, entry: "Field[Any]") -> str:
 
 
 def _faults() -> str:
-    rows = [(code(name), kind.help, "; ".join(map(_parameter, kind.parameters))) for name, kind in KINDS.items()]
-    schedule = [(code(entry.name), entry.allowed, entry.help) for entry in SCHEDULE]
+    rows = [(code(kind), help_of(kind), "; ".join(map(_parameter, parameters_of(kind)))) for kind in KINDS]
     return "\n\n".join(
         (
             "## `[[faults]]`",
             "Each fault is one such section: its name in the key `fault`, and the keys below.",
             table(("`fault`", "effect", "keys"), rows),
-            "Every fault may have these keys too:",
-            table(("key", "allowed", "meaning"), schedule),
         )
     )
 

@@ -29,7 +29,9 @@ def open_port(url: str, profile: Profile) -> ReopenablePort:
     try:
         port: ReopenablePort = open_serial_port(url, profile.serial.baud or 9600, timeout_s, exclusive=True)
     except (OSError, ValueError) as error:
-        raise SessionError(f"cannot open {url}: {error}; check the name, the rights and the table") from error
+        raise SessionError(
+            f"cannot open {url}: {error}; check the port name, permissions (dialout group) and power"
+        ) from error
     return port
 
 

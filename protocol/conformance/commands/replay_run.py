@@ -40,14 +40,14 @@ def run_replay(options: argparse.Namespace, profile: Profile, port: ReopenablePo
             f"the table stands at {session.home_deg} deg, the record began at {record.home_deg}; bring it there first"
         )
     try:
-        parted = _send(record, starts_deg, session, Wire(recorded_port), stand, profile)
+        differing = _send(record, starts_deg, session, Wire(recorded_port), stand, profile)
         session.end()
     except BaseException:
         session.stop()
         say(session.how_it_was_left)
         raise
-    tell(f"{parted} of {len(record.cases)} cases part")
-    return int(parted > 0)
+    tell(f"{len(record.cases)} cases compared, {differing} differ")
+    return int(differing > 0)
 
 
 def _send(
@@ -58,13 +58,13 @@ def _send(
     Raises:
         SessionError: the table is elsewhere, so it carried out what it has to refuse; or it refuses S or A.
     """
-    parted = 0
+    differing = 0
     for case, start_deg in zip(record.cases, starts_deg, strict=True):
         session.begin_replay(case.id, start_deg)
         parting = replay(case, wire, stand, profile)
-        parted += parting is not None
+        differing += parting is not None
         tell(f"{'parts' if parting else 'same':9} {case.id}{f': {parting}' if parting else ''}")
-    return parted
+    return differing
 
 
 def _wanted(record: Record, cases: Sequence[Case], path: Path) -> Record:

@@ -73,7 +73,7 @@ def _junit_file(options: argparse.Namespace) -> Path:
         try:
             directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise UsageError(f"{directory}: is no directory and cannot become one: {error.strerror}") from error
+            raise UsageError(f"{directory}: cannot create directory: {error.strerror}") from error
         if not os.access(directory, os.W_OK | os.X_OK):
             raise UsageError(f"{directory}: cannot be written to; name another directory, or change its rights")
     return junit
@@ -127,7 +127,7 @@ def _progress(
             tell(f"{outcome.verdict:9} {outcome.case.id}: {outcome.reason}")
         if outcome.verdict in _BAD:
             tell(f"          {outcome.case.clause.level}: {outcome.case.clause.text}")
-            tell(f"          again: {_repeat(options, outcome.case)}")
+            tell(f"          To repeat: {_repeat(options, outcome.case)}")
         if len(outcomes) < total:
             show_progress(f"{len(outcomes)}/{total} {outcome.case.id}")
 

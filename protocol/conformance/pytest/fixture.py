@@ -92,7 +92,7 @@ class RotaryTable:
     def _do(self, capability: str, deed: Callable[[Stand], None]) -> None:
         try:
             if capability not in self._stand.capabilities:
-                pytest.skip(f"lacks {capability}")
+                pytest.skip(f"{capability} not available")
             deed(self._stand)
         except BenchError as error:
             pytest.fail(str(error), pytrace=False)

@@ -57,7 +57,7 @@ def test_clause(
         pytest.skip(outcome.reason)
     if outcome.verdict in {Verdict.FAIL, Verdict.ERROR}:
         clause = f"{case.clause.number} {case.clause.level}: {case.clause.text}"
-        pytest.fail(f"{outcome.reason}\n{clause}\nagain: {_repeat(case, pytestconfig)}", pytrace=False)
+        pytest.fail(f"{outcome.reason}\n{clause}\nTo repeat: {_repeat(case, pytestconfig)}", pytrace=False)
 
 
 def _repeat(case: Case, config: pytest.Config) -> str:

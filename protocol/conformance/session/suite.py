@@ -215,7 +215,7 @@ class Session:
             return f"waived by the profile: {waived}"
         lacking = sorted(case.needs - self.capabilities)
         if lacking:
-            return f"lacks {' and '.join(lacking)}"
+            return f"{' and '.join(lacking)} not available"
         if case.travel_deg > self.profile.motion.reach_deg:
             return f"turns by {case.travel_deg:g} deg, the profile allows {self.profile.motion.reach_deg:g}"
         return ""

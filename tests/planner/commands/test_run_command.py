@@ -47,7 +47,7 @@ def test_a_run_is_verified_and_leaves_its_files(
     assert run(plan_file, out) == 0
     shown = capsys.readouterr()
     assert shown.out.startswith("verified: within 0.")
-    said = re.fullmatch(r"(.*) s of the table took (.*) s: (.*) times real time\n", shown.err)
+    said = re.fullmatch(r"(.*) s of table time in (.*) s: (.*) times real time\n", shown.err)
     assert said is not None
     table_s, wall_s, times_real = map(float, said.groups())
     assert table_s == pytest.approx(result_in(out)["commands"][-1]["time_s"], abs=3.0)

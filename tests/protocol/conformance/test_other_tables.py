@@ -66,12 +66,12 @@ def test_what_such_a_table_lacks_is_said(tmp_path: Path) -> None:
     outcomes = outcomes_of(Make(), tmp_path, "[rig]\nsees_disconnect = false\n", Stand())
     reasons = {outcome.reason for outcome in outcomes if outcome.verdict is Verdict.SKIPPED}
     assert reasons == {
-        "lacks a trigger input that the rig can drive",
-        "lacks a way to switch the table off and on",
-        "lacks a way to preset the position counter",
-        "lacks a view of the encoder beside the wire",
-        "lacks a table that sees its client go",
-        "lacks error replies",
+        "a trigger input that the rig can drive not available",
+        "a way to switch the table off and on not available",
+        "a way to preset the position counter not available",
+        "a view of the encoder beside the wire not available",
+        "a table that sees its client go not available",
+        "error replies not available",
     }
 
 
