@@ -1,4 +1,4 @@
-"""The stand-in rotary table: firmware and plant behind a virtual serial port.
+"""The emulator of the rotary table: firmware and plant behind a virtual serial port.
 
 Importing it teaches pyserial the port `emulator://`, a private table in virtual time.
 """

@@ -1,4 +1,4 @@
-"""The command line of the stand-in: `python -m emulator --pty`."""
+"""The command line of the emulator: `python -m emulator --pty`."""
 
 import argparse
 import math
@@ -41,7 +41,7 @@ class UsageError(Exception):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the stand-in until it is told to end, and return the exit status."""
+    """Run the emulator until it is told to end, and return the exit status."""
     try:
         options = _parse(arguments)
         config = load_config(options.config).with_serial(

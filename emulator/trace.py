@@ -172,7 +172,7 @@ def read_trace(path: Path) -> Trace:
 
 
 def _trace_of(columns: Mapping[str, Any]) -> Trace:
-    import numpy as np  # noqa: PLC0415  # the stand-in itself runs without numpy
+    import numpy as np  # noqa: PLC0415  # the emulator itself runs without numpy
 
     def numbers(name: str) -> "NDArray[np.float64]":
         return np.array(columns[name], dtype=np.float64)
@@ -232,7 +232,7 @@ def _read_csv(path: Path) -> dict[str, list[str]]:
 
 
 def _read_npz(path: Path) -> "dict[str, NDArray[np.float64 | np.str_]]":
-    import numpy as np  # noqa: PLC0415  # the stand-in itself runs without numpy
+    import numpy as np  # noqa: PLC0415  # the emulator itself runs without numpy
 
     with path.open("rb") as data, np.load(data, allow_pickle=False) as file:
         if set(file.files) != set(_COLUMNS):

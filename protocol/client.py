@@ -51,7 +51,7 @@ class TableClient:
         Raises:
             PortError: the port cannot be opened.
         """
-        # Here, since the stand-in shares this package and starts without pyserial.
+        # Here, since the emulator shares this package and starts without pyserial.
         from protocol.serial_port import open_serial_port  # noqa: PLC0415  # see above
 
         try:

@@ -30,7 +30,7 @@ def request(path: Path, command: str, timeout_s: float = TIMEOUT_S, **parameters
     try:
         reply = _exchange(path, line, timeout_s)
     except (OSError, ValueError) as error:
-        raise BenchError(f"{path}: {error}; is this the --control socket of a running stand-in?") from error
+        raise BenchError(f"{path}: {error}; is this the --control socket of a running emulator?") from error
     fields = _fields_of(reply)
     if fields.pop("ok", None) is True:
         return fields
@@ -133,5 +133,5 @@ def _fields_of(reply: bytes) -> dict[str, Any]:
 
 def _no_answer(path: Path, reply: bytes) -> BenchError:
     if not reply:
-        return BenchError(f"{path}: the stand-in hung up without an answer")
-    return BenchError(f"{path}: {reply[:80]!r} is no answer of a stand-in; is this its control channel?")
+        return BenchError(f"{path}: the emulator closed the connection without an answer")
+    return BenchError(f"{path}: {reply[:80]!r} is not an answer of an emulator; is this its control channel?")

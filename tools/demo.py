@@ -1,6 +1,6 @@
 """The main job, on real input: `python -m tools.demo --out DIR`.
 
-Plans the shipped scan of a cylinder, starts a stand-in table on a pty as a program of its own, streams the plan to it,
+Plans the shipped scan of a cylinder, starts an emulator on a pty as a program of its own, streams the plan to it,
 proves from what came back that the motion was the planned one, and names the page that shows it all.
 `python -m tools.demo preemption --out DIR` draws Fig. 4 of the paper instead.
 """
@@ -22,16 +22,16 @@ from tools.preemption import draw_preemption, stand_in
 
 SCAN = "cylinder"
 TIME_SCALE = 1.5
-"""The stand-in runs this much faster than real, so that nobody waits for a scan of 47 s."""
+"""The emulator runs this much faster than real, so that nobody waits for a scan of 47 s."""
 LEAD_S = 0.0035
-"""How far the stand-in's encoder runs behind its reference."""
+"""How far the emulator's encoder runs behind its reference."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demonstration and return the exit status: 0 when the motion was verified."""
     parser = Parser(
         prog=program_name("tools.demo"),
-        description="Plan a scan, stream it to a stand-in table on a pseudo-terminal, and verify the motion.",
+        description="Plan a scan, stream it to an emulator on a pseudo-terminal, and verify the motion.",
         epilog="example: python -m tools.demo --out build/demo",
     )
     parser.add_argument("job", choices=("scan", "preemption"), nargs="?", default="scan", help="default: scan")

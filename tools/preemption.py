@@ -1,6 +1,6 @@
 """A motion that new commands pre-empt again and again (Fig. 4 of the paper), on a real pty, drawn.
 
-Starts the stand-in as a program of its own and opens the port that it prints with pyserial.
+Starts the emulator as a program of its own and opens the port that it prints with pyserial.
 """
 
 import subprocess
@@ -28,7 +28,7 @@ def draw_preemption(out: Path) -> Path:
     """Drive the motion over a pty, and return the picture of what the table did; trace and picture go to `out`.
 
     Raises:
-        OSError: the stand-in cannot be started, or a file cannot be written.
+        OSError: the emulator cannot be started, or a file cannot be written.
         TableError: the table did not do its part.
     """
     with stand_in("--pty", "--trace", str(out / "trace.csv")) as port, TableClient.open(port) as table:
@@ -54,7 +54,7 @@ def _drive(table: TableClient) -> None:
 
 @contextmanager
 def stand_in(*arguments: str) -> Iterator[str]:
-    """Run the stand-in as a program of its own and yield its port's name; what it records is complete afterwards.
+    """Run the emulator as a program of its own and yield its port's name; what it records is complete afterwards.
 
     Ctrl-C at the terminal does not reach it: the table has to be there to be stopped.
     """

@@ -1,4 +1,4 @@
-"""Long runs of the stand-in, each with what must hold at its end: `python -m tools.soak noise day year clients wrap`.
+"""Long runs of the emulator, each with what must hold at its end: `python -m tools.soak noise day year clients wrap`.
 
 A soak is small in the tests and full here; both run these functions.
 """
@@ -218,7 +218,7 @@ def _descriptors(process: "subprocess.Popen[str]") -> int:
 
 @contextmanager
 def _stand_in(link: Path) -> "Iterator[tuple[str, subprocess.Popen[str]]]":
-    """Run a stand-in on a pty under a link."""
+    """Run an emulator on a pty under a link."""
     command = own_program("emulator", "--pty", "--link", str(link), "--baud", "0")
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=own_environment()

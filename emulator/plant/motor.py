@@ -59,7 +59,7 @@ def discretise(motor: Motor, inertia_kg_m2: float, tick_s: float) -> MotorStep:
 def matrix_exponential(matrix: Matrix) -> Matrix:
     """Return e to a small square matrix: Taylor's series of the matrix halved until it is small, then squared back.
 
-    Here and not from scipy, so that the stand-in starts without it.
+    Here and not from scipy, so that the emulator starts without it.
     """
     size = len(matrix)
     norm = max(sum(abs(entry) for entry in row) for row in matrix)

@@ -41,7 +41,7 @@ class PtyPort:
 
     Args:
         baud: the table's rate in baud; 0 when bytes are not paced, and no rate of the client's is then wrong.
-        warn: takes one sentence for the person who runs the stand-in.
+        warn: takes one sentence for the person who runs the emulator.
 
     Attributes:
         link: what leads to the device by another name.

@@ -36,7 +36,7 @@ class TcpPort:
     Args:
         host: name or address to listen on.
         port: TCP port, 0 for any that is free.
-        warn: takes one sentence for the person who runs the stand-in.
+        warn: takes one sentence for the person who runs the emulator.
 
     Raises:
         OSError: the address cannot be listened on.

@@ -23,10 +23,10 @@ class ControlSocket:
     """The listening end; up to `MOST_CLIENTS` may be there at once.
 
     Args:
-        path: where the socket is put. One that a stand-in which has died left behind is replaced.
+        path: where the socket is put. One that an emulator which has died left behind is replaced.
 
     Raises:
-        OSError: something else is at the path, another stand-in listens there, or it cannot be written.
+        OSError: something else is at the path, another emulator listens there, or it cannot be written.
     """
 
     def __init__(self, path: Path) -> None:

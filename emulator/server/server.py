@@ -1,4 +1,4 @@
-"""The running stand-in: one loop that keeps the table level with the clock and carries bytes between it and its ports.
+"""The running emulator: one loop that keeps the table level with the clock and carries bytes between it and its ports.
 
 The table is advanced lazily: when a client or a signal calls, when a byte on the line is due, and every now and then
 so that there is never much to catch up with.
@@ -45,7 +45,7 @@ class Server:
         ports: where clients come in. Replies go to all of them.
         signals: entered before the ports' names are published.
         control: the control channel, if there is one.
-        warn: takes one sentence for the person who runs the stand-in.
+        warn: takes one sentence for the person who runs the emulator.
     """
 
     def __init__(

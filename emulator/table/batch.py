@@ -1,7 +1,7 @@
 """Many ticks at machine speed: the functions of `tick`, compiled by numba.
 
-For tuning, Monte Carlo and the verification of plans. The compiled functions are those that the stand-in interprets,
-so states agree to the last bit; a test holds them to it. This module needs numpy and numba, the stand-in does not.
+For tuning, Monte Carlo and the verification of plans. The compiled functions are those that the emulator interprets,
+so states agree to the last bit; a test holds them to it. This module needs numpy and numba, the emulator does not.
 """
 
 from functools import cache

@@ -1,6 +1,6 @@
 """One tick of the whole table: voltage to motion to counts to the next voltage.
 
-A pure function of constants, state and inputs, in the part of Python that numba compiles: the stand-in runs it
+A pure function of constants, state and inputs, in the part of Python that numba compiles: the emulator runs it
 interpreted, `batch` compiled, with the same results to the last bit. The new duty waits in the PWM's buffer for one
 tick, as the controller computes while the old one is on the bridge.
 """

@@ -41,7 +41,7 @@ class Settings(NamedTuple):
     """How a motion is run.
 
     Attributes:
-        lag_s: how long after the reference the encoder is at the same angle; the default is that of the stand-in's
+        lag_s: how long after the reference the encoder is at the same angle; the default is that of the emulator's
             speed loop.
         lead_s: how long before their time the commands take effect. With the lag, the encoder is in time; with 0, the
             reference is.

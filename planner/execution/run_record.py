@@ -22,7 +22,7 @@ class Observation(NamedTuple):
 
     Attributes:
         time_s: when, in the time of the motion.
-        source: "H", "L", or "inside" for a look that a stand-in allowed; "H late" when the answer came so late that
+        source: "H", "L", or "inside" for a look that an emulator allowed; "H late" when the answer came so late that
             the time is uncertain.
         encoder_deg: the encoder, as `source` tells it.
         column: the scan location whose trigger this belongs to.

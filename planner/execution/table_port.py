@@ -5,7 +5,7 @@ import serial
 from protocol import Clock, Port, PortError, WallClock
 from protocol.serial_port import open_serial_port
 
-# The stand-in's port `emulator://` is found by pyserial wherever the stand-in is installed; nothing of it is used here.
+# The emulator's port `emulator://` is found by pyserial wherever the emulator is installed; nothing of it is used here.
 _STAND_IN = "emulator"
 
 CONTROL_TIMEOUT_S = 1.0
@@ -13,18 +13,18 @@ CONTROL_TIMEOUT_S = 1.0
 
 
 class ScaledClock:
-    """The time of a stand-in that runs faster or slower than real."""
+    """The time of an emulator that runs faster or slower than real."""
 
     def __init__(self, clock: Clock, time_scale: float) -> None:
         """Count `time_scale` seconds in each of `clock`'s."""
         self._clock, self._time_scale = clock, time_scale
 
     def now_s(self) -> float:
-        """Return the stand-in's seconds since an arbitrary but fixed moment."""
+        """Return the emulator's seconds since an arbitrary but fixed moment."""
         return self._clock.now_s() * self._time_scale
 
     def sleep_s(self, duration_s: float) -> None:
-        """Return when so much of the stand-in's time has passed."""
+        """Return when so much of the emulator's time has passed."""
         self._clock.sleep_s(duration_s / self._time_scale)
 
 
@@ -35,7 +35,7 @@ def open_port(url: str, baud: int, timeout_s: float, time_scale: float = 1.0) ->
         url: what to open.
         baud: bits a second.
         timeout_s: for reading and writing.
-        time_scale: that of the stand-in behind the port; the port's clock then runs like the stand-in's.
+        time_scale: that of the emulator behind the port; the port's clock then runs like the emulator's.
 
     Raises:
         PortError: it cannot be opened.

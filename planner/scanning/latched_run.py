@@ -29,7 +29,7 @@ from protocol.progress import Progress
 _FIRST_PROFILE_S = 0.06
 # From a trigger to the reading of its latch.
 _READING_AFTER_S = 0.002
-# How much more the table may be off its plan at one trigger than at those around it; the stand-in stays below a half.
+# How much more the table may be off its plan at one trigger than at those around it; the emulator stays below a half.
 _TRACKING_DEG = 0.08
 
 

@@ -194,7 +194,7 @@ def _trigger_line(port: object, table: TableClient, options: ScanOptions) -> Tri
     if options.control is None:
         raise ScanError(
             f"{options.port}: the simulated probe has no line to trigger this table;"
-            " use emulator://, or a stand-in with its --control channel"
+            " use emulator://, or an emulator with its --control channel"
         )
     return ProbeByHand(ControlChannel(options.control, CONTROL_TIMEOUT_S), table.clock)
 

@@ -1,7 +1,7 @@
 """The line on which the probe tells robot and table that it takes a profile; the probe on it is simulated.
 
 Once started, a laser probe runs at its own rate, whatever else goes on. The table behind a port in simulated time gets
-its edges at their exact times, between two ticks. A stand-in that runs in real time gets them over its control channel,
+its edges at their exact times, between two ticks. An emulator that runs in real time gets them over its control channel,
 when the host has time for it.
 """
 
@@ -174,7 +174,7 @@ class ProbeOnPort:
 
 
 class ProbeByHand:
-    """A probe that the host fires: a stand-in that runs in real time, through a view into it."""
+    """A probe that the host fires: an emulator that runs in real time, through a view into it."""
 
     def __init__(self, view: InsideView, clock: Clock) -> None:
         """Take over a view, and the clock of the table's port."""

@@ -40,7 +40,7 @@ class StandIn:
         wait_until(lambda: words in self.stderr)
 
     def stop(self) -> int:
-        """End the stand-in as a service manager would and return its exit status."""
+        """End the emulator as a service manager would and return its exit status."""
         self.process.terminate()
         status = self.process.wait(PATIENCE_S)
         assert self.process.stdout is not None
@@ -57,7 +57,7 @@ def wait_until(condition: Callable[[], bool]) -> None:
 
 @pytest.fixture
 def stand_in(tmp_path: Path) -> Iterator[Callable[..., StandIn]]:
-    """Start stand-ins with the given arguments."""
+    """Start emulators with the given arguments."""
     started: list[StandIn] = []
 
     def start(*arguments: str) -> StandIn:
@@ -76,7 +76,7 @@ def _wait_until() -> Callable[[Callable[[], bool]], None]:
 
 @pytest.fixture
 def warnings() -> list[str]:
-    """What a port said to the person who runs the stand-in; its `append` is the port's `warn`."""
+    """What a port said to the person who runs the emulator; its `append` is the port's `warn`."""
     return []
 
 

@@ -1,4 +1,4 @@
-"""A stand-in that stands still, for the control channel to act on."""
+"""An emulator that stands still, for the control channel to act on."""
 
 from emulator.config.table_config import load_config
 from emulator.table.table import Table

@@ -1,4 +1,4 @@
-"""What tests of the running stand-in share: its start, and a client that waits for answers."""
+"""What tests of the running emulator share: its start, and a client that waits for answers."""
 
 import subprocess
 from collections.abc import Callable

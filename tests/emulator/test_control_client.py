@@ -1,4 +1,4 @@
-"""The command line that talks to a running stand-in."""
+"""The command line that talks to a running emulator."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""The stand-in as its users meet it: a process, a port, and clients that nobody here wrote."""
+"""The emulator as its users meet it: a process, a port, and clients that nobody here wrote."""
 
 import shutil
 import subprocess

@@ -1,4 +1,4 @@
-"""What clients that misbehave, or die, do not do to the stand-in."""
+"""What clients that misbehave, or die, do not do to the emulator."""
 
 import os
 import random

@@ -31,12 +31,12 @@ scan_speed_mm_s = 25
 time_step_s = 0.5
 """
 SLOWLY = 0.3
-"""The time scale of the stand-in under a scan that would soon be over."""
+"""The time scale of the emulator under a scan that would soon be over."""
 STANDS = re.compile(r"the table was stopped, and stands at (-?[0-9.]+) deg")
 
 
 class StandIn(NamedTuple):
-    """A stand-in on a pty, and its control channel."""
+    """An emulator on a pty, and its control channel."""
 
     port: str
     control: Path

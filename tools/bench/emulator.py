@@ -1,4 +1,4 @@
-"""What the stand-in costs, beside peers that run in the same minute on the same machine."""
+"""What the emulator costs, beside peers that run in the same minute on the same machine."""
 
 import os
 import resource
@@ -31,7 +31,7 @@ EXCHANGES = 2000
 
 
 def bench(stream: TextIO) -> None:
-    """Print every figure of the stand-in."""
+    """Print every figure of the emulator."""
     _bench_simulation(stream)
     _bench_growth(stream)
     _bench_virtual_time(stream)
@@ -109,7 +109,7 @@ def _bench_round_trip(stream: TextIO) -> None:
         ours = _round_trips(path)
     rows = [
         (name, f"{percentile(times, 0.5) * 1e3:.3f} ms", f"{percentile(times, 0.99) * 1e3:.3f} ms")
-        for name, times in (("raw pty echo, in one process", echo), ("H, stand-in in its own process", ours))
+        for name, times in (("raw pty echo, in one process", echo), ("H, emulator in its own process", ours))
     ]
     ratios = [f"{percentile(ours, share) / percentile(echo, share):.1f}" for share in (0.5, 0.99)]
     rows.append(("ratio", ratios[0], ratios[1]))
@@ -139,7 +139,7 @@ def _bench_idle(stream: TextIO) -> None:
         time.sleep(4.0)
         share = (_cpu_s(process.pid) - before) / (time.perf_counter() - start)
     print_table(
-        stream, "Idle in real time", ("program", "share of a core"), [("stand-in, table at rest", f"{share:.1%}")]
+        stream, "Idle in real time", ("program", "share of a core"), [("emulator, table at rest", f"{share:.1%}")]
     )
 
 

@@ -1,4 +1,4 @@
-"""A run of the table alone in its process, without numpy and numba, as the stand-in runs it.
+"""A run of the table alone in its process, without numpy and numba, as the emulator runs it.
 
 python -m tools.bench.interpreted_run 90 24 86400     24 motions by 90 degrees in a day; prints wall seconds and peak MB
 """

@@ -6,7 +6,7 @@ from protocol.conformance.bench.wire import ReopenablePort
 from protocol.conformance.profile.profile import Profile
 
 _STAND_IN_PACKAGE = "emulator"
-"""Where pyserial looks for the stand-in's own kind of URL, `emulator://`; it need not be installed."""
+"""Where pyserial looks for the emulator's own kind of URL, `emulator://`; it need not be installed."""
 
 
 class SessionError(Exception):

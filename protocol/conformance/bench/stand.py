@@ -1,7 +1,7 @@
 """What can be done to the table besides talking to it: trigger it, switch it off and on, preset its counter.
 
 Who stands behind the port decides which of these there are: a table in the same process (the port has a `table`), the
-control channel of a stand-in, programs that the profile names, or nobody.
+control channel of an emulator, programs that the profile names, or nobody.
 """
 
 import shlex

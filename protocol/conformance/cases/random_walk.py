@@ -1,7 +1,7 @@
 """Random walks through the protocol, beside a model of the registers: what no list of cases would think of.
 
 On a simulated table a failing walk is shrunk where it was found. A real table is not made to repeat it: the walk is
-drawn again from its seed on the stand-in, and shrunk there.
+drawn again from its seed on the emulator, and shrunk there.
 """
 
 from collections.abc import Callable
@@ -44,20 +44,20 @@ def walk(rig: Rig) -> None:
 
 
 def _on_the_stand_in(rig: Rig, chance: int) -> str:
-    """Return what the stand-in does on the same walks."""
+    """Return what the emulator does on the same walks."""
     try:
         port = open_port(_STAND_IN_URL, rig.profile)
     except SessionError:
-        return "there is no stand-in here on which to shrink it"
+        return "there is no emulator here on which to shrink it"
     stand = stand_beside(port, None, rig.profile)
     twin = Rig(Wire(RecordedPort(port), rig.profile.byte_s), rig.profile, stand, 0, Random(0))  # noqa: S311  # not used
     try:
         _search_and_shrink(twin, chance, ON_A_PORT)
     except NonconformityError as error:
-        return f"on the stand-in too: {error}"
+        return f"on the emulator too: {error}"
     finally:
         port.close()
-    return "the stand-in walks the same way without fault"
+    return "the emulator walks the same way without fault"
 
 
 def _search_and_shrink(rig: Rig, chance: int, size: tuple[int, int]) -> None:

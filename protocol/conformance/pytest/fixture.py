@@ -20,7 +20,7 @@ from protocol.errors import TableError
 from protocol.own_program import own_environment, own_program
 
 PTY = "pty"
-"""In the place of a port's URL: a fresh stand-in on a pseudo-terminal."""
+"""In the place of a port's URL: a fresh emulator on a pseudo-terminal."""
 _START_S = 20.0
 
 
@@ -29,7 +29,7 @@ class RotaryTable:
 
     Attributes:
         url: what opens it. A table in process has nothing but `port`: each opening of `emulator://` is another table.
-        control: the control channel of a stand-in in another process, where there is one.
+        control: the control channel of an emulator in another process, where there is one.
         profile: what is known of it.
     """
 
@@ -100,7 +100,7 @@ class RotaryTable:
 
 @contextmanager
 def pty_stand_in(folder: Path) -> Iterator[tuple[str, Path]]:
-    """Run a stand-in on a pseudo-terminal; yield its device and its control channel."""
+    """Run an emulator on a pseudo-terminal; yield its device and its control channel."""
     control = folder / "control"
     command = own_program("emulator", "--pty", "--control", str(control))
     with subprocess.Popen(  # noqa: S603 - this very interpreter, with words of our own
@@ -111,7 +111,7 @@ def pty_stand_in(folder: Path) -> Iterator[tuple[str, Path]]:
         try:
             url = process.stdout.readline().strip()
             if not url:
-                pytest.fail(f"the stand-in did not start: {process.stderr.read().strip()}")
+                pytest.fail(f"the emulator did not start: {process.stderr.read().strip()}")
             yield url, control
         finally:
             process.terminate()

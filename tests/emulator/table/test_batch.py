@@ -44,7 +44,7 @@ def test_interpreted_and_compiled_agree_to_the_last_bit(seed: int) -> None:
     samples = np.empty((TICKS // 7, len(COLUMNS)))
     interpreted = advance(
         snapshot.constants, snapshot.state, TICKS, motions.astype(object), loads.astype(object), 7, samples
-    )  # as objects: Python's own numbers, as in the stand-in
+    )  # as objects: Python's own numbers, as in the emulator
     compiled, compiled_samples = run(snapshot.constants, snapshot.state, TICKS, motions, loads, every=7)
     assert repr(compiled) == repr(interpreted)
     assert compiled_samples.tobytes() == samples.tobytes()

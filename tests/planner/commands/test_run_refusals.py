@@ -1,4 +1,4 @@
-"""What `run` refuses before anything moves, through the command line, on a stand-in that is asked where it is."""
+"""What `run` refuses before anything moves, through the command line, on an emulator that is asked where it is."""
 
 import json
 import subprocess
@@ -23,8 +23,8 @@ Change = Callable[[Document], object]
 
 @pytest.fixture(scope="module")
 def stand_in(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
-    """Yield the port and the control channel of a running stand-in."""
-    control = tmp_path_factory.mktemp("stand-in") / "control"
+    """Yield the port and the control channel of a running emulator."""
+    control = tmp_path_factory.mktemp("emulator") / "control"
     command = [sys.executable, "-m", "emulator", "--tcp", "0", "--control", str(control)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         assert process.stdout is not None

@@ -1,4 +1,4 @@
-"""A right table of another make: written from docs/protocol.md alone, in closed form, with nothing of the stand-in's.
+"""A right table of another make: written from docs/protocol.md alone, in closed form, with nothing of the emulator's.
 
 Its motor follows the reference at once; its encoder is coarse; how fast it answers and talks is for each test to say.
 """

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.realtime
 
 
 class StandIn:
-    """A running stand-in, its port and its control channel."""
+    """A running emulator, its port and its control channel."""
 
     def __init__(self, process: "subprocess.Popen[str]", control: Path) -> None:
         assert process.stdout is not None

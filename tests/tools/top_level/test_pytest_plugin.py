@@ -78,7 +78,7 @@ def test_a_port_that_cannot_be_opened_fails_the_test_in_one_line(project: Path) 
     ("words", "sentence"),
     [
         (["--table-profile", "none.toml"], "none.toml: cannot be read"),
-        (["--table-control", "none"], "is this the --control socket of a running stand-in?"),
+        (["--table-control", "none"], "is this the --control socket of a running emulator?"),
     ],
 )
 def test_what_the_fixture_cannot_use_fails_the_test_in_one_line(words: list[str], sentence: str, project: Path) -> None:

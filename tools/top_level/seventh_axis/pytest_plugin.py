@@ -28,10 +28,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="URL",
         default=IN_PROCESS,
         help="the table for the fixture rotary_table and for the conformance suite: a device, a URL of pyserial's, or "
-        f"`{PTY}` for a fresh stand-in on a pseudo-terminal (default: {IN_PROCESS}, in process and in simulated time)",
+        f"`{PTY}` for a fresh emulator on a pseudo-terminal (default: {IN_PROCESS}, in process and in simulated time)",
     )
     add("--table-profile", metavar="FILE", type=Path, help="TOML file of what is known of the table")
-    add("--table-control", metavar="PATH", type=Path, help="the control channel of the stand-in at the port")
+    add("--table-control", metavar="PATH", type=Path, help="the control channel of the emulator at the port")
     add("--table-yes", action="store_true", help="a real table may be moved as the profile says")
 
 

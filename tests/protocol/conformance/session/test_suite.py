@@ -249,7 +249,7 @@ def test_on_a_real_table_a_failing_walk_is_not_repeated_but_shrunk_on_the_stand_
     rigs = [rig_on(port_to(MUTANTS["R counts from the old target"][1]), seed) for seed in range(8)]
     for rig in rigs:
         rig.wire.port.inner = UnclockedPort(rig.wire.port.inner)
-    assert first_failure(rigs).endswith("the stand-in walks the same way without fault")
+    assert first_failure(rigs).endswith("the emulator walks the same way without fault")
 
 
 def first_failure(rigs: Sequence[Rig]) -> str:
