@@ -13,9 +13,9 @@ class Reason(IntEnum):
 
     REACHED = 0
     OUT_OF_REACH = 1
-    """The wrist centre is nearer or farther than upper arm and forearm can put it."""
+    """The wrist center is nearer or farther than upper arm and forearm can put it."""
     SINGULAR = 2
-    """A joint's angle is undefined: axes 4 and 6 coincide, or the wrist centre lies on axis 1 (or on axis 2)."""
+    """A joint's angle is undefined: axes 4 and 6 coincide, or the wrist center lies on axis 1 (or on axis 2)."""
     JOINT_1_LIMIT = 3
     JOINT_2_LIMIT = 4
     JOINT_3_LIMIT = 5

@@ -33,7 +33,7 @@ class Part(NamedTuple):
 
     Attributes:
         name: What reasons call it.
-        link: Its place in the chain of bodies; parts of one link and of neighbouring links are not checked.
+        link: Its place in the chain of bodies; parts of one link and of neighboring links are not checked.
         frame: The frame it moves with: 0 the base, 1 to 6 the one after each joint.
         start_mm: `(3,)`, one end of its segment in that frame.
         end_mm: `(3,)`, the other end.

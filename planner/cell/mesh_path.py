@@ -78,7 +78,7 @@ def mesh_waypoints(
 def following(waypoints: FloatArray, mesh: trimesh.Trimesh, stand_off_mm: float) -> FloatArray:
     """Return waypoints `(n, 4, 4)` moved along their beams until the nearest surface around each is at the stand-off.
 
-    Where no surface is near a beam, the way is that between its neighbours. Waypoints that fit the mesh stay.
+    Where no surface is near a beam, the way is that between its neighbors. Waypoints that fit the mesh stay.
 
     Raises:
         PathError: No beam meets the mesh.

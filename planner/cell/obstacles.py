@@ -44,12 +44,12 @@ class Obstacle(NamedTuple):
 
 
 def box(name: str, lengths_mm: tuple[float, float, float], pose: FloatArray, *, turning: bool) -> Obstacle:
-    """Return a box by its full lengths along x, y and z, centred on `pose`."""
+    """Return a box by its full lengths along x, y and z, centered on `pose`."""
     return Obstacle(name, BOX, np.array(lengths_mm, dtype=np.float64) / 2, pose, turning)
 
 
 def cylinder(name: str, radius_mm: float, height_mm: float, pose: FloatArray, *, turning: bool) -> Obstacle:
-    """Return a cylinder along z, centred on `pose`."""
+    """Return a cylinder along z, centered on `pose`."""
     return Obstacle(name, CYLINDER, np.array([radius_mm, height_mm / 2, 0.0]), pose, turning)
 
 

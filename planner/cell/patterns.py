@@ -1,7 +1,7 @@
-"""The predefined scanning patterns of Fig. 2, as waypoints of the probe over an idealised workpiece.
+"""The predefined scanning patterns of Fig. 2, as waypoints of the probe over an idealized workpiece.
 
 Each pattern is drawn as corners in two or more coordinates of the surface (such as azimuth and height), filled in
-between, and laid onto the surface. Neighbouring strips lie line width x (1 - overlap) apart.
+between, and laid onto the surface. Neighboring strips lie line width x (1 - overlap) apart.
 
 | Fig. 2 | class    | patterns                                                  |
 |--------|----------|-----------------------------------------------------------|
@@ -37,7 +37,7 @@ class StripLayout:
     """How the strips of a pattern lie.
 
     Attributes:
-        overlap: Share of the line's width that a strip has in common with its neighbour.
+        overlap: Share of the line's width that a strip has in common with its neighbor.
         top_polar_deg: Where a sphere's strips begin, as an angle from its pole.
         lowest_polar_deg: Where a sphere's strips end: below its equator the table is in the way.
         bottom_margin_mm: Least height of the line's middle over the base of a cylinder.
@@ -53,7 +53,7 @@ class StripLayout:
     tilt_deg: float = 25.0
 
     def pitch_mm(self, line_width_mm: float) -> float:
-        """Return the distance of neighbouring strips."""
+        """Return the distance of neighboring strips."""
         return line_width_mm * (1.0 - self.overlap)
 
     def strip_centres(self, span_mm: float, line_width_mm: float) -> FloatArray:

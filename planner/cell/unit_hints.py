@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from planner.arrays import FloatArray
 from planner.cell.scan import Scan
 
-# Placements of a cell and paths around a part are longer than this in mm; in metres they are shorter.
+# Placements of a cell and paths around a part are longer than this in mm; in meters they are shorter.
 _SHORT_MM = 5.0
 # In degrees these turns are unusual, in radians they are quarters of a turn and halves of it.
 _QUARTER_RAD, _NEAR = np.pi / 4.0, 2e-3
@@ -20,7 +20,7 @@ _ALIKE_DEG = 10.0
 
 
 def unit_hint(scan: Scan) -> str | None:
-    """Return one sentence that names what looks like metres or radians, or None."""
+    """Return one sentence that names what looks like meters or radians, or None."""
     found = list(_suspects(scan))
     return "; ".join(found) + "? Lengths are in mm and angles in deg." if found else None
 

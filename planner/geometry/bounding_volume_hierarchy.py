@@ -1,7 +1,7 @@
 """A bounding volume hierarchy of triangles: a balanced tree of boxes that finds the nearest triangle of a mesh.
 
 The tree is laid out as a heap: node 1 is the root, node i has the children 2i and 2i + 1, and all leaves hold the same
-number of triangles. Kernels take coordinates one by one, in millimetres.
+number of triangles. Kernels take coordinates one by one, in millimeters.
 """
 
 from typing import NamedTuple

@@ -1,7 +1,7 @@
 """Distance between a box and a solid or a mesh, from below, by branch and bound.
 
 A signed distance changes by no more than the way that is gone, so what it is in the middle of a box bounds it in all of
-the box. Boxes are split until the bounds are close enough. Kernels take coordinates one by one, in millimetres.
+the box. Boxes are split until the bounds are close enough. Kernels take coordinates one by one, in millimeters.
 """
 
 from math import copysign, sqrt

@@ -1,7 +1,7 @@
 """Distance between capsules: a capsule is every point within a radius of a line segment.
 
 The distance of two capsules is that of their segments less both radii, so the segments are all there is to compute.
-Kernels take coordinates one by one, in millimetres, and allocate nothing.
+Kernels take coordinates one by one, in millimeters, and allocate nothing.
 """
 
 from math import sqrt

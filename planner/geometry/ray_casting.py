@@ -1,8 +1,8 @@
 """Rays against the triangles of a workpiece: what a ray meets first, and whether the way between two points is free.
 
 Embree finds the triangle in single precision; where the ray meets that triangle's plane is then computed in double
-precision. So a hit lies on the surface to far below a micrometre, and single precision only decides which of two
-neighbouring triangles a ray through their common edge belongs to.
+precision. So a hit lies on the surface to far below a micrometer, and single precision only decides which of two
+neighboring triangles a ray through their common edge belongs to.
 """
 
 from typing import NamedTuple

@@ -1,8 +1,8 @@
 """Distance between a line segment and a convex solid: a box, a cylinder, or a capsule (a sphere is a short one).
 
 The signed distance to a convex solid (negative inside) is a convex function along a segment, so each tangent bounds it
-from below and the lowest point is closed in on by letting tangents meet. Solids are centred on their own frame,
-their axis along z. Kernels take coordinates one by one, in millimetres, and allocate nothing.
+from below and the lowest point is closed in on by letting tangents meet. Solids are centered on their own frame,
+their axis along z. Kernels take coordinates one by one, in millimeters, and allocate nothing.
 """
 
 from math import sqrt

@@ -41,7 +41,7 @@ def _count_crossings(triangles: FloatArray, crossings: NDArray[np.int32]) -> Non
     """Add each crossing of a vertical grid line with a triangle to the highest grid point below it.
 
     Corners `(n, 3, 3)` are in grid spacings from the grid's first point. What a line's side of an edge is comes out
-    with the opposite sign, bit for bit, for the neighbour that has the edge the other way round, so a line through a
+    with the opposite sign, bit for bit, for the neighbor that has the edge the other way round, so a line through a
     closed surface slips through no edge.
     """
     nx, ny, nz = crossings.shape

@@ -1,6 +1,6 @@
 """Closed-form inverse kinematics of an ortho-parallel arm with a spherical wrist: all eight configurations.
 
-The wrist centre fixes joints 1 to 3, the flange's orientation then fixes joints 4 to 6. Two choices of joint 1
+The wrist center fixes joints 1 to 3, the flange's orientation then fixes joints 4 to 6. Two choices of joint 1
 (LEFTY faces the wrist, RIGHTY turns its back to it), two of the elbow and two of the wrist give the eight solutions.
 
 For speed, what configurations share is computed once, sines and cosines come from the triangle's sides rather than its
@@ -131,7 +131,7 @@ def inverse(arm: FloatArray, T_BF: FloatArray, joints: FloatArray, reasons: Code
     a1, a2, a3 = arm[0, A_MM], arm[1, A_MM], arm[2, A_MM]
     # With all twists negated, joints 2, 3 and 5 turn the other way round and nothing else changes.
     sense = -arm[0, SIN_ALPHA]
-    # The wrist centre lies in the plane that joint 1 turns, which passes axis 1 at the distance `lateral`.
+    # The wrist center lies in the plane that joint 1 turns, which passes axis 1 at the distance `lateral`.
     x = T_BF[0, 3] - d6 * T_BF[0, 2]
     y = T_BF[1, 3] - d6 * T_BF[1, 2]
     drop = d1 - (T_BF[2, 3] - d6 * T_BF[2, 2])
@@ -151,7 +151,7 @@ def inverse(arm: FloatArray, T_BF: FloatArray, joints: FloatArray, reasons: Code
         facing = azimuth - shoulder if side == 0 else azimuth + shoulder + math.pi
         joint_1 = _middle(arm, 0) if on_axis_1 else _nearest_turn(arm, 0, facing)
         c1, s1 = math.cos(joint_1), math.sin(joint_1)
-        # The triangle of upper arm, forearm and the span from joint 2 to the wrist centre, `ahead` of it and below.
+        # The triangle of upper arm, forearm and the span from joint 2 to the wrist center, `ahead` of it and below.
         ahead = (in_plane if side == 0 else -in_plane) - a1
         span2 = ahead * ahead + drop * drop
         cos_elbow = (span2 - a2 * a2 - forearm2) / (2.0 * a2 * forearm)

@@ -11,7 +11,7 @@ from planner.kinematics.arm import Arm
 def configurations(arm: Arm, joints: FloatArray) -> IndexArray:
     """Return the slot `(n,)` of the configuration that each row of joints `(n, 6)`, in radians, is in.
 
-    LEFTY when the wrist centre lies ahead of axis 1; ABOVE when the elbow bends down from the stretched arm (up, for
+    LEFTY when the wrist center lies ahead of axis 1; ABOVE when the elbow bends down from the stretched arm (up, for
     RIGHTY); FLIP when joint 5 is negative. On a boundary, where two configurations meet, LEFTY and NOFLIP win.
     """
     # Mirrored twists turn joints 2 and 3 the other way round.

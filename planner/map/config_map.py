@@ -43,7 +43,7 @@ def wrapped(sample: int, count: int) -> int:
 def column_value(values: FloatArray, epsilon: float, location: int, angle_deg: float) -> float:
     """Return f_R at a scan location and any (unwrapped) table angle; 0 where it is forbidden.
 
-    Linear between the two neighbouring samples, and 0 unless each of them that has a weight exceeds `epsilon`.
+    Linear between the two neighboring samples, and 0 unless each of them that has a weight exceeds `epsilon`.
     """
     count: int = values.shape[1]
     position = angle_deg * (count / 360.0)
@@ -132,7 +132,7 @@ class ConfigurationMap:
 
     @property
     def angle_step_deg(self) -> float:
-        """Distance of neighbouring samples along the angle axis."""
+        """Distance of neighboring samples along the angle axis."""
         return 360.0 / self.angle_count
 
     @property

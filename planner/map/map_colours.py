@@ -1,4 +1,4 @@
-"""The colours of a configuration map: gray by f_R where it is allowed, and a hue by reason where it is forbidden.
+"""The colors of a configuration map: gray by f_R where it is allowed, and a hue by reason where it is forbidden.
 
 Families share a hue: reach blue, joint limits violet, the singularity amber, user factors green, collisions red.
 """
@@ -33,7 +33,7 @@ _OTHER_COLLISIONS = "#f7cdc7"
 
 
 class LegendEntry(NamedTuple):
-    """A reason as it is shown: its text, its colour, and the share of the map's cells that it forbids."""
+    """A reason as it is shown: its text, its color, and the share of the map's cells that it forbids."""
 
     text: str
     colour: str
@@ -58,7 +58,7 @@ def coloured(configuration_map: ConfigurationMap) -> tuple[FloatArray, list[Lege
 
 
 def _by_frequency(reasons: CodeArray) -> list[tuple[int, int, str]]:
-    """Return the codes in a map with their counts and colours, the most frequent first."""
+    """Return the codes in a map with their counts and colors, the most frequent first."""
     codes, counts = np.unique(reasons[reasons != Reason.REACHED], return_counts=True)
     order = np.argsort(-counts, kind="stable")
     collisions = iter(_COLLISION)

@@ -50,13 +50,13 @@ def synthetic_map(family: MapFamily, seed: int) -> ConfigurationMap:
 def blocks_map(
     location_count: int, angle_count: int, blocks: list[tuple[int, int, int, int]], edge: int = 4
 ) -> ConfigurationMap:
-    """Return a bright map with rectangular obstacles, grey for `edge` samples around them.
+    """Return a bright map with rectangular obstacles, gray for `edge` samples around them.
 
     Args:
         location_count: columns.
         angle_count: samples of angle.
         blocks: (first location, last location, first angle, last angle) of each obstacle, samples, inclusive.
-        edge: width of the grey border.
+        edge: width of the gray border.
     """
     forbidden = np.zeros((location_count, angle_count))
     for first, last, low, high in blocks:

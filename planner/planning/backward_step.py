@@ -166,4 +166,4 @@ def _leave(speed: int, backward: BackwardStep, arrivals: CostArray, barriers: Co
             total_a = cost_a + barrier_a[m] + lower_a * row_a[m] + upper_a * row_a[m + 1]
             total_b = cost_b + barrier_b[m] + lower_b * row_b[m] + upper_b * row_b[m + 1]
             total_c = cost_c + barrier_c[m] + lower_c * row_c[m] + upper_c * row_c[m + 1]
-            best[m] = min(min(min(best[m], total_a), total_b), total_c)  # noqa: PLW3301 - this form is vectorised
+            best[m] = min(min(min(best[m], total_a), total_b), total_c)  # noqa: PLW3301 - this form is vectorized

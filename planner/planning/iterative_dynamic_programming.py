@@ -34,7 +34,7 @@ def refine(problem: Problem, plan: Plan, node_deg: float, accepts: Callable[[Pla
         problem: what is crossed.
         plan: where to begin; without pauses.
         node_deg: spacing to begin with, halved from pass to pass.
-        accepts: what else a plan must fulfil; a pass whose plan it refuses is not kept.
+        accepts: what else a plan must fulfill; a pass whose plan it refuses is not kept.
     """
     passes = 0
     for _ in range(MOST_PASSES):

@@ -56,7 +56,7 @@ class StepRows(NamedTuple):
     """What is known of each node p before the step from column k to the next.
 
     The nodes are in two rows, even and odd, so that p = 2 q + i is found in row i & 1 at place
-    q + (i >> 1) - lattice.first_q + margin, and neighbouring q are neighbours in memory.
+    q + (i >> 1) - lattice.first_q + margin, and neighboring q are neighbors in memory.
 
     Attributes:
         room_above: greatest change i + j of a step that stays allowed upwards; far below any where p is forbidden.

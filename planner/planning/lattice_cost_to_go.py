@@ -186,7 +186,7 @@ def _lower(
         total_a = row_a[m] + cost_a + UNREACHABLE * max(need - room[m], ZERO)
         total_b = row_b[m] + cost_b + UNREACHABLE * max(need_b - room[m], ZERO)
         total_c = row_c[m] + cost_c + UNREACHABLE * max(need_c - room[m], ZERO)
-        best[m] = min(min(min(best[m], total_a), total_b), total_c)  # noqa: PLW3301 - this form is vectorised
+        best[m] = min(min(min(best[m], total_a), total_b), total_c)  # noqa: PLW3301 - this form is vectorized
 
 
 @kernel
@@ -201,5 +201,5 @@ def _lower_turning(
 ) -> None:
     """Lower `best` by a step that turns back on its way."""
     for m in range(len(best)):
-        lacking = max(max(need - room[m], turn - turn_room[m]), ZERO)  # noqa: PLW3301 - this form is vectorised
+        lacking = max(max(need - room[m], turn - turn_room[m]), ZERO)  # noqa: PLW3301 - this form is vectorized
         best[m] = min(best[m], onward[m] + cost + UNREACHABLE * lacking)

@@ -1,6 +1,6 @@
 """Post-processing that removes acceleration peaks from a plan without new risks or costs.
 
-A plan is changed by waves (+d, -2d, +d) on the accelerations of three neighbouring blocks of steps. Under Eq. (3) and
+A plan is changed by waves (+d, -2d, +d) on the accelerations of three neighboring blocks of steps. Under Eq. (3) and
 (4) such a wave ends with the angle and the speed that were there before, so all that follows stays as it is and what
 precedes was never touched. A wave is accepted only if
 

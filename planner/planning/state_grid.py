@@ -24,7 +24,7 @@ class Grid(NamedTuple):
     Attributes:
         angle_count: angles over one turn.
         angle_origin_deg: the first of them.
-        speed_step_deg_s: distance of neighbouring speeds.
+        speed_step_deg_s: distance of neighboring speeds.
         half_count: speeds run from -half_count to half_count steps.
         jumps: (n_jumps,) the changes of speed that a step may make, in speed steps, ascending.
     """

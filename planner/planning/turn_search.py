@@ -2,7 +2,7 @@
 
 Dijkstra's search over columns, forwards: where it ends, the first location without a way is known, and which joint bars
 the way. A state is (turns, speed i, q); angles, speeds and steps are those of `lattice.py`, turns those of
-`joint_turns.py`. On neighbouring q most moves change the turns alike. They are gathered into runs, so that the
+`joint_turns.py`. On neighboring q most moves change the turns alike. They are gathered into runs, so that the
 innermost loop runs along q, contiguous and without branches.
 """
 
@@ -47,7 +47,7 @@ class NotFound(NamedTuple):
 
 
 class _Runs(NamedTuple):
-    """Neighbouring moves that change the turns alike.
+    """Neighboring moves that change the turns alike.
 
     Attributes:
         first: (n_runs,) place of the first node.
@@ -279,7 +279,7 @@ def _move(
 
 @kernel
 def _lower(leaving: FloatArray, arrival: FloatArray, choice: int, later: FloatArray, choices: ChoiceArray) -> None:
-    """Lower the costs of neighbouring states of the next column where those of this one offer less."""
+    """Lower the costs of neighboring states of the next column where those of this one offer less."""
     for m in range(len(leaving)):
         total = leaving[m] + arrival[m]
         is_better = total < later[m]

@@ -1,4 +1,4 @@
-"""Find the table's axis from a reference sphere that turns with the table: its centre moves on a circle.
+"""Find the table's axis from a reference sphere that turns with the table: its center moves on a circle.
 
 A fit that is not plausible, or too uncertain for the scan, is refused with the figure that says so.
 """
@@ -21,7 +21,7 @@ GREATEST_POINT_ERROR_MM = 0.1
 # Three determine an axis, and one more shows whether it is one. Angles nearer than this are the same place.
 _FEWEST_PLACES = 4
 _SAME_PLACE_DEG = 10.0
-# The noise of a sphere's centre that is assumed at least: few residuals can agree by chance.
+# The noise of a sphere's center that is assumed at least: few residuals can agree by chance.
 _LEAST_NOISE_MM = 0.002
 # Two tests share the allowed false alarms: all residuals together, and their order.
 _ALARMS_EACH = FALSE_ALARMS / 2.0
@@ -50,7 +50,7 @@ class AxisCalibration:
 
     Attributes:
         T_BT: The table in the base, `(4, 4)`: z along the axis; origin and x as near to the nominal ones as z allows.
-        residuals_mm: `(n,)` distance of each sphere centre from where the fit has it.
+        residuals_mm: `(n,)` distance of each sphere center from where the fit has it.
         rms_mm: Their root mean square.
         uncertainty_mm: Expected distance (root mean square) of the axis from the true one, at the table's top.
         uncertainty_deg: Expected angle (root mean square) between the two.
@@ -73,26 +73,26 @@ def calibrate_table_axis(
     noise_mm: float | None = None,
     part: PartSize | None = None,
 ) -> AxisCalibration:
-    """Return the table's axis from the centres of a sphere that turns with it.
+    """Return the table's axis from the centers of a sphere that turns with it.
 
     A point on the table is at a + cos(theta) u + sin(theta) v, with u and v at right angles and of equal length. The
-    linear fit without those two conditions gives the start for the fit with them. What the centres cannot tell, where
+    linear fit without those two conditions gives the start for the fit with them. What the centers cannot tell, where
     along the axis the table's top is and which direction angle 0 has, is taken from the nominal placement.
 
     The uncertainty follows from the covariance of the fit. It is refused where it would move a point of the part by
     more than `GREATEST_POINT_ERROR_MM`. The residuals are tested for a sphere that moved on the table.
 
     Args:
-        centres_B: Centres in the base, `(n, 3)` in mm, in the order in which they were taken.
+        centres_B: Centers in the base, `(n, 3)` in mm, in the order in which they were taken.
         angles_deg: The table's angle at each, `(n,)`.
         nominal_T_BT: About where the table is.
         greatest_rms_mm: A worse fit is refused.
-        noise_mm: Standard deviation of each coordinate of a centre; estimated from the residuals where left out, and
+        noise_mm: Standard deviation of each coordinate of a center; estimated from the residuals where left out, and
             then at least 0.002 mm.
         part: What will be scanned.
 
     Raises:
-        CalibrationError: The centres do not determine the axis well enough, or do not lie as on a turning table.
+        CalibrationError: The centers do not determine the axis well enough, or do not lie as on a turning table.
     """
     _check_angles(centres_B, angles_deg)
     if noise_mm is not None:

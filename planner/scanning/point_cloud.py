@@ -10,7 +10,7 @@ import numpy as np
 from planner.arrays import FloatArray, IndexArray
 from protocol.whole_file import whole_file
 
-# A vertex as it lies in the file. Single precision leaves 0.03 micrometres at 500 mm.
+# A vertex as it lies in the file. Single precision leaves 0.03 micrometers at 500 mm.
 _COORDINATES = ("x", "y", "z", "beam_x", "beam_y", "beam_z")
 _VERTEX = np.dtype([*((name, "<f4") for name in _COORDINATES), ("profile", "<u4")])
 
@@ -72,7 +72,7 @@ class PlyWriter:
 
 
 class XyzWriter:
-    """A text file with a line for each point: x y z in mm, to a tenth of a micrometre. Used as `PlyWriter`."""
+    """A text file with a line for each point: x y z in mm, to a tenth of a micrometer. Used as `PlyWriter`."""
 
     def __init__(self, file: Path) -> None:
         """Begin the file."""

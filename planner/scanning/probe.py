@@ -38,7 +38,7 @@ class LaserProbe:
         line_rate_hz: Profiles a second that the probe can take.
         incidence_limit_deg: Greatest angle between beam and normal.
         cameras_mm: Where the two cameras are, in frame S.
-        noise_mm: Standard deviation of a point along its ray (the paper: 25 micrometres).
+        noise_mm: Standard deviation of a point along its ray (the paper: 25 micrometers).
     """
 
     nearest_mm: float = 100.0

@@ -39,7 +39,7 @@ class ProbeCalibration:
 
     Attributes:
         T_FS: The probe on the flange, `(4, 4)`.
-        centre_B_mm: The reference sphere's centre in the base, `(3,)`.
+        centre_B_mm: The reference sphere's center in the base, `(3,)`.
         residuals_mm: `(m,)` height of each point above the sphere.
         rms_mm: Their root mean square.
         noise_ratio: Root of chi-square over its degrees of freedom: the residual in units of the probe's noise.
@@ -77,7 +77,7 @@ def calibrate_probe(
     """Return the probe's place on the flange from views of a sphere that stands still, of known radius.
 
     The points of all views must lie at the radius from one centre: |T_BF T_FS p - c| = r. Profiles of a sphere are
-    circles, and a circle does not say on which side of it the centre is; so a single guess can end in a false minimum.
+    circles, and a circle does not say on which side of it the center is; so a single guess can end in a false minimum.
     The search starts from the nominal place turned into each of the 24 directions of a cube; the best end counts.
 
     The last fit is the maximum-likelihood one for noise along the rays. Its residuals are tested: all of them against

@@ -14,7 +14,7 @@ _LEAST_COSINE = 0.2
 _SEARCH_EVALUATIONS = 60
 
 TURN, SHIFT, CENTRE, RADIUS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 10)
-"""The unknowns: turn (rad) and shift (mm) of the probe on the flange, the sphere's centre and radius (mm)."""
+"""The unknowns: turn (rad) and shift (mm) of the probe on the flange, the sphere's center and radius (mm)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class ProbeFit:
 
     Attributes:
         T_FS: The probe on the flange, `(4, 4)`.
-        centre: The sphere's centre in the base, `(3,)`.
+        centre: The sphere's center in the base, `(3,)`.
         radius_mm: The sphere's radius, as given or as found.
         heights_mm: `(m,)` height of each point above the sphere.
         residuals: `(m,)` what was minimised: the heights, or the errors along the rays in units of the noise.
@@ -121,7 +121,7 @@ class _Sphere:
         return self.height_slopes(unknown, self._views.points)[0]
 
     def ray_jacobian(self, unknown: FloatArray) -> FloatArray:
-        """Return the derivatives of measured less modelled distances, by the implicit function |t u - c| = r."""
+        """Return the derivatives of measured less modeled distances, by the implicit function |t u - c| = r."""
         met = self.distances(unknown)[:, np.newaxis] * self._rays
         slopes, along = self.height_slopes(unknown, met)
         return np.asarray(slopes / np.minimum(along, -_LEAST_COSINE)[:, np.newaxis])
@@ -137,7 +137,7 @@ def fit_heights(views: Views, radius_mm: float, guess: FloatArray, centre: Float
         views: The points.
         radius_mm: The sphere's radius.
         guess: T_FS to start from.
-        centre: The sphere's centre to start from; the middle of the points where left out.
+        centre: The sphere's center to start from; the middle of the points where left out.
     """
     sphere = _Sphere(views, guess, radius_mm)
     if centre is None:

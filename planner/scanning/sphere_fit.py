@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 from planner.arrays import FloatArray
 from planner.scanning.calibration import CalibrationError
 
-# A sphere of known radius has three unknowns; a second centre whose residual is up to this larger fits as well.
+# A sphere of known radius has three unknowns; a second center whose residual is up to this larger fits as well.
 _FEWEST_POINTS = 4
 _RIVAL_RATIO = 1.5
 
@@ -19,7 +19,7 @@ class SphereFit(NamedTuple):
     Attributes:
         centre: `(3,)` in mm.
         rms_mm: Root mean square of the points' heights above it.
-        deviations_mm: `(3,)` standard deviation of each coordinate of the centre, for heights with the given noise.
+        deviations_mm: `(3,)` standard deviation of each coordinate of the center, for heights with the given noise.
     """
 
     centre: FloatArray
@@ -28,12 +28,12 @@ class SphereFit(NamedTuple):
 
 
 def sphere_centre(points: FloatArray, radius_mm: float) -> FloatArray:
-    """Return the centre `(3,)` of a sphere of known radius through points `(m, 3)`, by least squares.
+    """Return the center `(3,)` of a sphere of known radius through points `(m, 3)`, by least squares.
 
     Points in one plane, as of a single profile, fit two spheres, one on each side of their plane; they are refused.
 
     Raises:
-        CalibrationError: There are fewer than 4 points, or two centres fit equally well.
+        CalibrationError: There are fewer than 4 points, or two centers fit equally well.
     """
     return fit_sphere(points, radius_mm).centre
 

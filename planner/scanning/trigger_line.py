@@ -1,7 +1,7 @@
 """The line on which the probe tells robot and table that it takes a profile; the probe on it is simulated.
 
 Once started, a laser probe runs at its own rate, whatever else goes on. The table behind a port in simulated time gets
-its edges at their exact times, between two ticks. An emulator that runs in real time gets them over its control channel,
+its edges at their exact times, between two ticks. An emulator in real time gets them over its control channel,
 when the host has time for it.
 """
 

@@ -92,11 +92,11 @@ class ProbeTrial(NamedTuple):
 
 
 class AxisTrial(NamedTuple):
-    """Centres of a sphere that turns with the table.
+    """Centers of a sphere that turns with the table.
 
     Attributes:
         angles_deg: The table's angles.
-        noise_mm: Noise of each coordinate of a centre.
+        noise_mm: Noise of each coordinate of a center.
         moved_mm: By how much the sphere moves on the table half-way, in a random direction.
     """
 

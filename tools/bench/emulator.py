@@ -167,7 +167,7 @@ def _interpreted_motion(config: TableConfig, simulated_s: float) -> Callable[[],
 
 
 def _linear_loop(config: TableConfig, simulated_s: float) -> Callable[[], object]:
-    """Return the peer: motor and PI in python-control, without friction, gears, quantisation or protocol."""
+    """Return the peer: motor and PI in python-control, without friction, gears, quantization or protocol."""
     motor, tick_s = config.motor, 1.0 / config.control.tick_hz
     inertia = motor.rotor_inertia_kg_m2 + config.gears.inertia_kg_m2
     plant = control.ss(

@@ -37,7 +37,7 @@ def of_maps(maps: MapFamily, step_s: float = 0.25, weight_factor: float = 1.0) -
 
 
 def of_noise(forbidden: float) -> Callable[[int], Problem]:
-    """Return problems on maps whose every sample is independent of its neighbours."""
+    """Return problems on maps whose every sample is independent of its neighbors."""
 
     def problem(seed: int) -> Problem:
         generator = np.random.default_rng(seed)

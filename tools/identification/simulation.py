@@ -89,7 +89,7 @@ def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) ->
     Args:
         config: The table.
         duty: (n,) as computed at the end of each tick.
-        delay_ticks: From there to when it is on the bridge, from 0; a fraction of a tick mixes two neighbours.
+        delay_ticks: From there to when it is on the bridge, from 0; a fraction of a tick mixes two neighbors.
     """
     whole = int(delay_ticks)
     padded = np.concatenate([np.zeros(whole + 2), duty])[: len(duty) + 1]

@@ -5,7 +5,7 @@ loop's timing is the firmware's: the speed is the count's difference over a wind
 tick in the PWM's buffer before it is on the bridge (`emulator.table.tick`).
 
 What is not linear is left out and stated elsewhere: dry friction acts as a constant load while the table turns, the
-quantisation of speed and PWM as two noises (`quantisation_noise`), and the backlash as the states of `Teeth`.
+quantization of speed and PWM as two noises (`quantisation_noise`), and the backlash as the states of `Teeth`.
 """
 
 from enum import StrEnum

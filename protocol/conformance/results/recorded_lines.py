@@ -31,7 +31,7 @@ class Line(NamedTuple):
 def recorded_lines(cases: Iterable[RecordedCase], profile: Profile) -> Iterator[Line]:
     """Yield lines and deeds in their order; times count from the beginning of the replay."""
     begin_s = free_s = 0.0
-    half = forgotten = b""  # of a line; and the part before the client left, or cancelled it
+    half = forgotten = b""  # of a line; and the part before the client left, or canceled it
     for case in cases:
         now_s, origin_s = begin_s, case.wire[0].time_s
         forgotten, half = forgotten + half, b""  # the replay cancels it

@@ -68,7 +68,7 @@ def test_the_line_passes_over_the_whole_sphere_between_the_polar_angles(pattern:
     points = sphere.mesh().vertices
     polar = np.degrees(np.arccos((points[:, 2] - centre[2]) / 80.0))
     wanted = points[(polar > LAYOUT.top_polar_deg + 5.0) & (polar < LAYOUT.lowest_polar_deg - 5.0)]
-    # The line is straight, so its ends stand off the sphere: compare directions from the centre.
+    # The line is straight, so its ends stand off the sphere: compare directions from the center.
     covered = covered_points(waypoints_of("sphere", pattern)) - centre
     assert _greatest_gap(_unit(covered) * 80.0, wanted - centre) < 6.0
 

@@ -1,4 +1,4 @@
-"""What `map`, `plan` and `scan` print of a scan in metres or radians, in which nothing can be reached."""
+"""What `map`, `plan` and `scan` print of a scan in meters or radians, in which nothing can be reached."""
 
 from pathlib import Path
 

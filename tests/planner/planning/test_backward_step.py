@@ -1,4 +1,4 @@
-"""The vectorised step against Bellman's equation written out, state by state, in double precision."""
+"""The vectorized step against Bellman's equation written out, state by state, in double precision."""
 
 import numpy as np
 import numpy.typing as npt

@@ -1,4 +1,4 @@
-"""The vectorised search against scipy's shortest path, and against trying every motion."""
+"""The vectorized search against scipy's shortest path, and against trying every motion."""
 
 import math
 

@@ -74,7 +74,7 @@ def test_incidence_ends_where_the_limit_is(tilt_deg: float, is_measured: bool) -
 def test_on_a_sphere_incidence_ends_at_the_limits_circle() -> None:
     sphere = trimesh.creation.icosphere(subdivisions=6, radius=20.0)
     seen = taken(sphere, placement(0.0, 0.0, 170.0, 0.0, 180.0, 0.0))
-    # The triangle of centre, laser and surface point: the incidence is the angle outside it at the point.
+    # The triangle of center, laser and surface point: the incidence is the angle outside it at the point.
     off_axis = np.arctan2(np.abs(seen.points_S[:, 0]), seen.points_S[:, 2])
     incidence_deg = np.degrees(np.arcsin(170.0 * np.sin(off_axis) / 20.0))
     assert incidence_deg.max() == pytest.approx(65.0, abs=1.0)  # a facet is 2 deg wide, a point 0.3
