@@ -34,7 +34,7 @@ class TableClient:
         Args:
             port: an open pyserial port or its like; its read time-out is set here, its `clock` is used if it has one.
             timeout_s: how long to wait for a reply.
-            decimals: places after the point of the numbers sent.
+            decimals: decimal places of the numbers sent.
             braking_deg_s2: the greatest A to stop a table with that has not accepted one from this client.
         """
         self.port = port

@@ -43,7 +43,7 @@ class Dialogue:
 
     Attributes:
         clock: that of the port.
-        decimals: places after the point of the numbers sent.
+        decimals: decimal places of the numbers sent.
         reference: where the commands that were sent have brought the table's reference. A command whose reply is
             missing counts as carried out.
         greatest: the greatest S and the greatest A that the table has accepted.

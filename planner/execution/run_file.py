@@ -44,7 +44,7 @@ class RunConditions(NamedTuple):
         port: the port's URL.
         wire: what the commands had to pass.
         lead_s: how much ahead of their time they took effect.
-        tolerance_deg: what the encoder may deviate at a location.
+        tolerance_deg: allowed encoder deviation at a location.
         turns: full turns of the table added to the plan.
         pause_times: how long the robot takes in a pause.
         run_on_deg: how far the table was to run on at most if the line died; None in a run of an earlier version.

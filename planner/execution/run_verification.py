@@ -45,7 +45,7 @@ class RunVerification(NamedTuple):
         executed_cost: Eq. (7) of the encoder's path, its speeds and accelerations by differences; None where a
             location is unknown.
         latest_command_s: how late the latest command was.
-        tolerance_deg: what the encoder may deviate at a location.
+        tolerance_deg: allowed encoder deviation at a location.
         dead_line: how far the table would have run on if the line had died, and into what.
     """
 
@@ -104,7 +104,7 @@ def verify_run(
         motion: its motion.
         record: what was seen.
         lead_s: how much ahead of its time the reference was commanded.
-        tolerance_deg: what the encoder may deviate at a location.
+        tolerance_deg: allowed encoder deviation at a location.
     """
     plan, problem = run_input.plan, run_input.problem
     seen = [each for each in record.observations if each.time_s >= 0.0]

@@ -18,7 +18,7 @@ class Wire(NamedTuple):
     """What the commands have to pass.
 
     Attributes:
-        decimals: places after the point.
+        decimals: decimal places.
         baud: 10 bits a byte; 0 where bytes take no time.
         turnaround_s: from the end of a command to the start of the next beyond the time of the bytes: what driver,
             adapter and operating system take.
