@@ -177,9 +177,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("name", nargs="+", choices=SOAKS)
     parser.add_argument("--share", type=float, default=1.0, metavar="X", help="of the full size (default 1)")
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="random seed (default 0)"
-    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default 0)")
     options = parser.parse_args(arguments)
     return ended("soak", lambda: _run(options))
 

@@ -1,6 +1,7 @@
 """Each key that the code reads has its row in the reference."""
 
 import ast
+import inspect
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from emulator.config.table_config import load_config
 from emulator.faults.fault import KINDS, parameters_of
 from planner.cell.cell import Table
 from planner.cell.workpiece import CLASSES
+from planner.toml_table import TomlTable
 from protocol.conformance.profile.profile import load_profile
 from tools.reference.keys import Key, comments, key_page
 from tools.reference.planner_keys import arm_keys, bodies_keys, scan_keys
@@ -72,11 +74,17 @@ def test_a_key_of_the_planner_states_what_is_allowed_its_default_and_its_meaning
     assert all(key.allowed and key.notes for key in planner_keys.values())
 
 
+def test_each_method_that_reads_a_value_is_recorded() -> None:
+    methods = {name: inspect.signature(method) for name, method in vars(TomlTable).items() if callable(method)}
+    by_key = {name for name, signature in methods.items() if "key" in signature.parameters and name[0] != "_"}
+    assert by_key - {"name_of", "refuse", "table", "tables", "one_or_more"} == set(READERS)
+
+
 def test_recording_leaves_the_readers_as_they_were() -> None:
-    before = [getattr(recorded_keys.__globals__["TomlTable"], name) for name in READERS]
+    before = [getattr(TomlTable, name) for name in READERS]
     with pytest.raises(ZeroDivisionError):
         recorded_keys(lambda: 1 / 0)
-    assert [getattr(recorded_keys.__globals__["TomlTable"], name) for name in READERS] == before
+    assert [getattr(TomlTable, name) for name in READERS] == before
 
 
 def test_each_key_of_a_table_has_its_row() -> None:
