@@ -109,8 +109,8 @@ def test_a_failure_under_pytest_ends_with_the_command_that_repeats_it_alone(tmp_
     result = run_pytest(tmp_path, *words)
     assert "2 failed" in result.stdout
     # the first such line: where pytest finds the variable CI, its closing summary repeats each failure whole
-    again = next(line for line in result.stdout.splitlines() if line.startswith("again: pytest "))
-    result = run_pytest(tmp_path, *shlex.split(again)[2:])
+    again = next(line for line in result.stdout.splitlines() if line.startswith("To repeat: pytest "))
+    result = run_pytest(tmp_path, *shlex.split(again)[3:])
     assert f"1 failed, {len(all_cases()) - 1} deselected" in result.stdout
     assert "test_clause[7.1/1]" in result.stdout
 
