@@ -19,7 +19,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0; 1 for a negative verdict; 2 for input that cannot be used; 128 and the number of the signal that ended it.
     """
-    chosen = parser().parse_args(arguments)
+    chosen = parser().read(arguments)
     with ended_by_signals() as ending:
         return ending.status(_status_of(chosen))
 

@@ -4,6 +4,9 @@ An error is `PROGRAM: OBJECT: PROBLEM; what is allowed; what to do`, and status 
 """
 
 import argparse
+import shlex
+import sys
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 COMMAND = "seventh-axis"
@@ -28,6 +31,13 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, *, allow_abbrev: bool = False, **settings: Any) -> None:  # noqa: ANN401  # those of argparse
         super().__init__(allow_abbrev=allow_abbrev, **settings)
+
+    def read(self, arguments: Sequence[str] | None) -> argparse.Namespace:
+        """Return the options of a command line, by default the program's; `command_line` is the whole of it."""
+        words = sys.argv[1:] if arguments is None else list(arguments)
+        options = self.parse_args(words)
+        options.command_line = f"{self.prog} {shlex.join(words)}".rstrip()
+        return options
 
     def error(self, message: str) -> NoReturn:
         """End the program with status 2."""

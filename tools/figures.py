@@ -29,16 +29,14 @@ from planner.planning.dynamic_programming import dynamic_programming
 from planner.planning.lattice_choice import turn_lattice
 from planner.planning.local_maxima import local_maxima
 from planner.planning.plan import Outcome, Plan
-from planner.planning.plan_plots import CURVE_COLOUR, PLAN_COLOUR, draw_motion, draw_wrapped
+from planner.planning.plan_plots import PATH, draw_motion, draw_path
 from planner.planning.problem import Problem
 from planner.planning.ray_shooting import Rays, cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
+from planner.plot_style import AMBER, BLUE, SKY, VERMILION, new_figure, save_picture, styled
 from planner.table.cost import Weights
 from planner.table.motion import Limits, limited_acceleration, next_angle, next_speed
 from protocol.command_line import Parser, program_name
-from protocol.whole_file import whole_file
 from tools.command_line import ended
-
-RAY_COLOUR = "#7fb2e5"
 
 # The joint whose factor Fig. 5 shows: joint 1 of the arm.
 JOINT_RANGE_DEG = (-170.0, 170.0)
@@ -74,9 +72,10 @@ def obstacle_problem() -> Problem:
     )
 
 
+@styled()
 def figure_5() -> Figure:
     """Shape of Eq. (1) for several exponents."""
-    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    figure = new_figure(4.0, 6.4)
     axes = figure.subplots()
     lower, upper = JOINT_RANGE_DEG
     angles = np.linspace(lower, upper, 1001)
@@ -84,73 +83,78 @@ def figure_5() -> Figure:
         factor = [joint_factor(float(angle), lower, upper, exponent) for angle in angles]
         axes.plot(angles, factor, label=f"$\\gamma$ = {exponent:g}")
     axes.set(xlabel="joint angle (deg)", ylabel="$f_j$", xlim=JOINT_RANGE_DEG, ylim=(0.0, 1.05))
-    axes.set_title("Eq. (1): a joint's factor over its range")
-    axes.grid(visible=True, alpha=0.3)
+    axes.set_title("Fig. 5: a joint's factor over its range, Eq. (1)")
     axes.legend(loc="lower center", ncols=2)
     return figure
 
 
+@styled()
 def figure_6() -> Figure:
     """Return a grayscale configuration map with a solution: (a) 2D, (b) cylindrical view."""
     problem = shared_problem()
     plan = _plan(dynamic_programming(problem))
-    figure = Figure(figsize=(11.0, 4.8), layout="constrained")
+    figure = new_figure(4.8, 11.0)
     flat = figure.add_subplot(1, 2, 1)
     image = _draw_map(flat, problem.map)
-    draw_wrapped(flat, plan.angles_deg)
+    draw_path(flat, plan.angles_deg, **PATH)
     flat.set_title("(a) 2D view")
     figure.colorbar(image, ax=flat, label="$f_R$", shrink=0.85)
     round_view = figure.add_subplot(1, 2, 2, projection="3d")
     assert isinstance(round_view, Axes3D)
     _draw_cylinder(round_view, problem.map, plan.angles_deg)
     round_view.set_title("(b) cylindrical view")
+    figure.suptitle("Fig. 6: configuration map with a plan")
     return figure
 
 
+@styled()
 def figure_7() -> Figure:
     """Position, speed and acceleration of the path that Dijkstra's algorithm finds."""
     problem = shared_problem()
     lattice = turn_lattice(problem, SHARED_SPEED_COUNT, SHARED_WORK)
-    return _motion_figure(dijkstra(problem, lattice), "Dijkstra's algorithm on the graph of Eq. (8)")
+    return _motion_figure(dijkstra(problem, lattice), "Fig. 7: Dijkstra's algorithm on the graph of Eq. (8)")
 
 
+@styled()
 def figure_8() -> Figure:
-    """Ray shooting at four moments: a way left of both obstacles first, then one between them, which is cheaper."""
+    """Ray shooting at four moments: a way below both obstacles first, then one between them, which is cheaper."""
     problem = obstacle_problem()
     plan = _plan(ray_shooting(problem, OBSTACLE_RAYS))
-    figure = Figure(figsize=(10.5, 7.4), layout="constrained")
+    figure = new_figure(7.4, 10.5)
     titles = (
-        "(a) the rays see one way: left of both obstacles",
-        "(b) a ray finds a way between the obstacles",
-        "(c) that way is cheaper and is followed",
-        "(d) almost finished",
+        "(a) every free ray passes below both obstacles",
+        "(b) the cheapest ray passes between the obstacles",
+        "(c) below the first obstacle: the cheapest ray passes above the second",
+        "(d) past both obstacles",
     )
     for axes, label, moment in zip(figure.subplots(2, 2, sharex=True, sharey=True).flat, titles, MOMENTS, strict=True):
         _draw_map(axes, problem.map)
         _draw_rays(axes, problem, plan, moment)
-        axes.plot(plan.angles_deg[: moment + 1], color=CURVE_COLOUR, linewidth=2.2, label="planned so far")
-        axes.plot(moment, plan.angles_deg[moment], "o", color=CURVE_COLOUR, markersize=6)
+        axes.plot(plan.angles_deg[: moment + 1], color=BLUE, linewidth=2.2, label="planned so far")
+        axes.plot(moment, plan.angles_deg[moment], "o", color=BLUE, markersize=6)
         axes.set_title(label, fontsize=10)
         axes.label_outer()
-    figure.axes[0].legend(loc="lower left", fontsize=8, framealpha=0.9)
+    figure.axes[0].legend(loc="lower left", fontsize=8, frameon=True, framealpha=0.9)
+    figure.suptitle("Fig. 8: ray shooting at four moments")
     return figure
 
 
+@styled()
 def figure_9() -> Figure:
     """Position, speed and acceleration with ray shooting."""
-    return _motion_figure(ray_shooting(shared_problem()), "Ray shooting")
+    return _motion_figure(ray_shooting(shared_problem()), "Fig. 9: ray shooting")
 
 
+@styled()
 def _motion_figure(outcome: Outcome, title: str) -> Figure:
     problem, plan = shared_problem(), _plan(outcome)
-    figure = Figure(figsize=(7.2, 8.4), layout="constrained")
+    figure = new_figure(8.4, 7.2)
     on_map, speed, acceleration = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
     _draw_map(on_map, problem.map)
     brightest = _plan(local_maxima(problem)).angles_deg
-    on_map.plot(brightest % 360.0, ".", color="#e7a33e", markersize=3, label="local maxima")
-    draw_wrapped(on_map, plan.angles_deg)
-    on_map.plot([], [], color=PLAN_COLOUR, label="plan")
-    on_map.legend(loc="upper right", fontsize=8)
+    on_map.plot(brightest % 360.0, ".", color=AMBER, markersize=3, label="local maxima")
+    draw_path(on_map, plan.angles_deg, "plan", **PATH)
+    on_map.legend(loc="upper right", fontsize=8, frameon=True)
     on_map.set(xlabel="", title=f"{title}: cost {plan.cost.total:.1f}")
     draw_motion(speed, acceleration, problem, plan)
     return figure
@@ -168,6 +172,7 @@ def _draw_map(axes: Axes, configuration_map: ConfigurationMap) -> AxesImage:
         configuration_map.values.T, cmap="gray", vmin=0.0, vmax=1.0, origin="lower", aspect="auto", extent=extent
     )
     axes.set(xlabel="scan location", ylabel="table angle (deg)", yticks=range(0, 361, 60))
+    axes.grid(visible=False)
     return image
 
 
@@ -185,7 +190,7 @@ def _draw_cylinder(axes: Axes3D, configuration_map: ConfigurationMap, angles_deg
     )
     path = np.radians(angles_deg) + offset
     height = np.where(np.cos(path - towards_reader) > 0.05, 1.02, np.nan)
-    axes.plot(locations, height * np.cos(path), height * np.sin(path), color=PLAN_COLOUR, linewidth=2.5, zorder=10)
+    axes.plot(locations, height * np.cos(path), height * np.sin(path), color=VERMILION, linewidth=2.5, zorder=10)
     axes.set_box_aspect((2.2, 1.0, 1.0), zoom=1.3)
     axes.view_init(elev=float(np.degrees(elevation)), azim=float(np.degrees(azimuth)))
     axes.set(xlabel="scan location", yticks=[], zticks=[])
@@ -199,10 +204,10 @@ def _draw_rays(axes: Axes, problem: Problem, plan: Plan, moment: int) -> None:
     chosen = cheapest_ray(problem.terms, accelerations, moment, OBSTACLE_RAYS.horizon, empty, *state)
     rays = [_ray(problem, float(acceleration), moment, *state) for acceleration in accelerations]
     for ray in rays:
-        axes.plot(np.arange(moment, moment + len(ray)), ray, color=RAY_COLOUR, linewidth=0.9)
+        axes.plot(np.arange(moment, moment + len(ray)), ray, color=SKY, linewidth=0.9)
     best = rays[chosen]
-    axes.plot(np.arange(moment, moment + len(best)), best, color=PLAN_COLOUR, linewidth=2.0, label="cheapest ray")
-    axes.plot([], [], color=RAY_COLOUR, linewidth=0.9, label="rays")
+    axes.plot(np.arange(moment, moment + len(best)), best, color=VERMILION, linewidth=2.0, label="cheapest ray")
+    axes.plot([], [], color=SKY, linewidth=0.9, label="rays")
     axes.set_ylim(0.0, 359.0)
 
 
@@ -258,8 +263,7 @@ def _draw(options: argparse.Namespace) -> int:
         options.out.mkdir(parents=True, exist_ok=True)
         for name in options.names or FIGURES:
             path = options.out / f"{name}.png"
-            with whole_file(path) as partial:
-                FIGURES[name]().savefig(partial, dpi=150, metadata={"Software": None})
+            save_picture(FIGURES[name](), path)
             print(path)
     except OSError as error:
         print(f"cannot write the figures to {options.out}: {error.strerror}", file=sys.stderr)

@@ -17,6 +17,7 @@ from emulator.config.toml_section import ConfigError
 from protocol.client import TableClient
 from protocol.command_line import Parser, program_name
 from protocol.errors import TableError
+from protocol.page import Origin
 from protocol.progress import share_shown
 from protocol.whole_file import write_whole
 from tools.command_line import check_writable, ended
@@ -34,7 +35,7 @@ _NEEDED = ("gain", "time constant", "Coulomb friction")
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
-    options = parser().parse_args(arguments)
+    options = parser().read(arguments)
     return ended("identify", lambda: int(options.run(options)), ConfigError, RecordingError, TableError)
 
 
@@ -88,7 +89,7 @@ def _fit(options: argparse.Namespace) -> int:
     odds = motor_at_odds(found, config)
     if odds:
         print(f"identify: warning: {odds}", file=sys.stderr)
-    page = fit_report(found, config, str(options.recording), odds)
+    page = fit_report(found, config, str(options.recording), odds, Origin(options.command_line))
     write_whole(options.out, table_toml(found, odds))
     write_whole(report, page)
     print(f"wrote {options.out} and {report}", file=sys.stderr)

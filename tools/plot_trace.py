@@ -14,13 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from emulator.trace import Trace, read_trace
+from planner.plot_style import BLUE, GREEN, PALE, SKY, VERMILION, new_figure, save_picture, styled
 from protocol.command_line import Parser, program_name
 from protocol.data_file import did_you_mean
-from protocol.whole_file import whole_file
 from tools.command_line import ended
 from tools.command_marks import commands_of, mark_commands
 from tools.envelope import envelope
@@ -33,10 +32,7 @@ _EXAMPLE = """examples:
 Of commands close together the first ones are labeled, with the number of the others.
 """
 
-_REFERENCE, _MEASURED, _TRUE, _DUTY, _CURRENT = "#c8c8c8", "#0072b2", "#56b4e9", "#009e73", "#d55e00"
-"""Colours that remain apart for colour-blind readers (Okabe and Ito)."""
-
-_FIGURE_INCHES = (10.0, 7.5)
+_HEIGHT_IN = 7.5
 _THIN, _WIDE = 0.9, 4.0
 _LEGEND_SHARE = 0.25
 """Room above the curves for a legend, as a share of their range."""
@@ -64,27 +60,28 @@ _PANELS = (
         "speed (deg/s)",
         3.0,
         {
-            "reference_speed_deg_s": Signal("reference", _REFERENCE, _WIDE),
-            "true_speed_deg_s": Signal("true", _TRUE),
-            "speed_deg_s": Signal("measured", _MEASURED),
+            "reference_speed_deg_s": Signal("reference", PALE, _WIDE),
+            "true_speed_deg_s": Signal("true", SKY),
+            "speed_deg_s": Signal("measured", BLUE),
         },
     ),
     Panel(
         "position (deg)",
         2.0,
         {
-            "reference_deg": Signal("reference", _REFERENCE, _WIDE),
-            "true_deg": Signal("true", _TRUE),
-            "encoder_deg": Signal("encoder", _MEASURED),
+            "reference_deg": Signal("reference", PALE, _WIDE),
+            "true_deg": Signal("true", SKY),
+            "encoder_deg": Signal("encoder", BLUE),
         },
     ),
-    Panel("duty (%)", 2.0, {"duty": Signal("duty", _DUTY, factor=100.0)}),
-    Panel("current (mA)", 2.0, {"current_A": Signal("current", _CURRENT, factor=1000.0)}),
+    Panel("duty (%)", 2.0, {"duty": Signal("duty", GREEN, factor=100.0)}),
+    Panel("current (mA)", 2.0, {"current_A": Signal("current", VERMILION, factor=1000.0)}),
 )
 SIGNALS = tuple(name for panel in _PANELS for name in panel.signals)
 _DEFAULT_SIGNALS = tuple(name for name in SIGNALS if name != "true_deg")
 
 
+@styled()
 def draw_trace(
     trace: Trace,
     title: str = "",
@@ -109,8 +106,7 @@ def draw_trace(
     _check_signals(signals)
     rows, (begin_s, end_s) = _selection(trace, from_s, to_s)
     panels = [panel for panel in _PANELS if not panel.signals.keys().isdisjoint(signals)]
-    figure = Figure(figsize=_FIGURE_INCHES, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(_HEIGHT_IN)
     axes = figure.subplots(
         len(panels), 1, sharex=True, squeeze=False, height_ratios=[panel.height for panel in panels]
     )[:, 0].tolist()
@@ -157,13 +153,11 @@ def _draw_panel(axes: Axes, panel: Panel, trace: Trace, rows: slice, signals: tu
         times_s, values = envelope(trace.time_s[rows], signal.factor * getattr(trace, name)[rows])
         axes.plot(times_s, values, color=signal.color, linewidth=signal.linewidth, label=signal.label)
     axes.set_ylabel(panel.ylabel)
-    axes.grid(alpha=0.25)
-    axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.0)
     if len(chosen) > 1:
         low, high = axes.get_ylim()
         axes.set_ylim(low, high + _LEGEND_SHARE * (high - low))
-        axes.legend(loc="upper right", edgecolor="none", framealpha=0.7, ncols=len(chosen))
+        axes.legend(loc="upper right", ncols=len(chosen))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -199,14 +193,8 @@ def _draw(options: argparse.Namespace) -> int:
     signals = tuple(name.strip() for name in options.signals.split(",") if name.strip())
     _check_signals(signals)
     figure = draw_trace(read_trace(options.trace), options.trace.name, options.from_s, options.to_s, signals)
-    save_figure(figure, options.out)
+    save_picture(figure, options.out)
     return 0
-
-
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write the picture under a temporary name first, so that no half of it is ever at `path`."""
-    with whole_file(path) as partial:
-        figure.savefig(partial, dpi=150)
 
 
 if __name__ == "__main__":

@@ -10,9 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from emulator.trace import read_trace
+from planner.plot_style import save_picture
 from protocol import TableClient
 from protocol.own_program import own_environment, own_program
-from tools.plot_trace import draw_trace, save_figure
+from tools.plot_trace import draw_trace
 
 STEPS = (  # after how many seconds, top speed deg/s, acceleration deg/s2, target deg
     (0.0, 20.0, 20.0, 60.0),
@@ -37,7 +38,7 @@ def draw_preemption(out: Path) -> Path:
         read_trace(out / "trace.csv"), "A motion pre-empted in full run: the reference's speed never jumps"
     )
     picture = out / "preemption.png"
-    save_figure(figure, picture)
+    save_picture(figure, picture)
     return picture
 
 

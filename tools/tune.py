@@ -25,6 +25,7 @@ from pathlib import Path
 from emulator.config.table_config import load_config
 from emulator.config.toml_section import ConfigError
 from protocol.command_line import Parser, program_name
+from protocol.page import Origin
 from protocol.progress import share_shown
 from protocol.whole_file import whole_file
 from tools.command_line import check_folder, ended
@@ -42,7 +43,7 @@ _TUNE_FOLDER, _JUDGE_FOLDER = Path("build/tune"), Path("build/judge")
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
-    options = parser().parse_args(arguments)
+    options = parser().read(arguments)
     return ended("tune", lambda: _tune(options), ConfigError, TuningError)
 
 
@@ -55,7 +56,7 @@ def _tune(options: argparse.Namespace) -> int:
     check_folder(folder)
     with share_shown("tuning") as progress:
         tuning = tune(config, limits, options.plants, options.spread / 100.0, options.seed, progress)
-    _write(folder, tuning)
+    _write(folder, tuning, options.command_line)
     if not tuning.feasible:
         raise TuningError(_refusal(tuning, options))
     _print(tuning)
@@ -71,7 +72,7 @@ def _judge(options: argparse.Namespace) -> int:
     check_folder(folder)
     with share_shown("judging") as progress:
         tuning = judge(config, gains, limits, options.plants, options.spread / 100.0, options.seed, progress)
-    _write(folder, tuning)
+    _write(folder, tuning, options.command_line)
     _print(tuning)
     print(verdict(tuning))
     return 0 if tuning.feasible else 1
@@ -128,7 +129,7 @@ def _limits(options: argparse.Namespace) -> Limits:
     )
 
 
-def _write(folder: Path, tuning: Tuning) -> None:
+def _write(folder: Path, tuning: Tuning, command: str) -> None:
     """Write all files, or none of them."""
     drawings = plots(tuning)
     files = {}
@@ -137,7 +138,7 @@ def _write(folder: Path, tuning: Tuning) -> None:
         files = {"gains.toml": gains_toml(tuning.after), "gains.h": gains_header(tuning.after, gains)}
     files |= {f"{name}.svg": drawing for name, drawing in drawings.items()}
     files["figures.json"] = figures_json(tuning)
-    files["report.html"] = tune_report(tuning, drawings)
+    files["report.html"] = tune_report(tuning, drawings, Origin(command))
     folder.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
         for name, text in files.items():

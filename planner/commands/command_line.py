@@ -24,13 +24,13 @@ from protocol.command_line import Parser, program_name
 from protocol.data_file import did_you_mean
 from protocol.number_options import number, positive_number, whole_number
 
-_Commands = "argparse._SubParsersAction[argparse.ArgumentParser]"
+_Commands = "argparse._SubParsersAction[Parser]"
 REPORT_FILE = "report.html"
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     """Return the parser; what it returns has the name of its command in `command`."""
-    top: argparse.ArgumentParser = Parser(
+    top = Parser(
         prog=program_name("planner"),
         description="Plan the motion of a rotary table under a scanning robot arm.",
         epilog="examples: python -m planner new-scan part.stl --out part.toml;"
@@ -46,7 +46,7 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def _add_map(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def _add_map(commands: "argparse._SubParsersAction[Parser]") -> None:
     parser = commands.add_parser(
         "map",
         help="compute and draw a scan's configuration map",
@@ -58,7 +58,7 @@ def _add_map(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the map and its pictures")
 
 
-def _add_plan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def _add_plan(commands: "argparse._SubParsersAction[Parser]") -> None:
     parser = commands.add_parser(
         "plan",
         help="plan the table's motion along a scan",
@@ -83,7 +83,7 @@ def _add_plan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     )
 
 
-def _add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def _add_run(commands: "argparse._SubParsersAction[Parser]") -> None:
     parser = commands.add_parser(
         "run",
         help="carry out a plan on a table, and verify the motion",
@@ -127,7 +127,7 @@ def _add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     _add_emulator(parser)
 
 
-def _add_scan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def _add_scan(commands: "argparse._SubParsersAction[Parser]") -> None:
     parser = commands.add_parser(
         "scan",
         help="scan a workpiece with a simulated probe, and compute the error budget of its cloud",
@@ -163,7 +163,7 @@ def _add_scan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     )
 
 
-def _add_show(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def _add_show(commands: "argparse._SubParsersAction[Parser]") -> None:
     parser = commands.add_parser(
         "show",
         help="show a run as one HTML page",
@@ -174,7 +174,7 @@ def _add_show(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     parser.add_argument("--out", metavar="FILE", type=Path, help=f"the page (default: {REPORT_FILE} in DIR)")
 
 
-def _add_new_scan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def _add_new_scan(commands: "argparse._SubParsersAction[Parser]") -> None:
     parser = commands.add_parser(
         "new-scan",
         help="write a scan file for a mesh",

@@ -106,7 +106,7 @@ def report(scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -> str:
         f"planned in    {1e3 * (plan.computing_time_s or 0.0):.2f} ms",
         f"margins       {checked.clearance_deg:.2f} deg to the nearest forbidden sample, "
         f"{checked.speed_margin_deg_s:.2f} deg/s to the speed limit, "
-        f"{checked.acceleration_margin_deg_s2:.2f} deg/s^2 to the acceleration limit",
+        f"{checked.acceleration_margin_deg_s2:.2f} deg/s2 to the acceleration limit",
         f"arm           {_arm_verdict(motion)}",
         *_arm_lines(motion),
     ]

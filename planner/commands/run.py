@@ -4,6 +4,8 @@ import argparse
 import sys
 
 from planner.commands import options
+from planner.commands.command_line import REPORT_FILE
+from planner.commands.show import write_report
 from planner.errors import PlannerError
 from planner.execution.run import RunOptions, run_plan
 from planner.execution.run_verification import RunVerification
@@ -35,6 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise PlannerError(str(error)) from error
     except OSError as error:
         raise PlannerError(f"{arguments.out}: the run cannot be written there ({error.strerror or error})") from error
+    write_report(arguments.out, arguments.out / REPORT_FILE, arguments.command_line)
     sys.stdout.write(summary(checked))
     sys.stderr.write(f"{duration}\n")
     if checked.failure is not None:

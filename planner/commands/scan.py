@@ -13,6 +13,7 @@ from planner.scanning.scan_report import scan_report, verdict_of
 from planner.scanning.scan_run import Scanned, ScanOptions, scan_workpiece
 from planner.set_aside import set_aside
 from protocol import TableError
+from protocol.page import Origin
 from protocol.progress import progress_line
 from protocol.whole_file import write_whole
 
@@ -46,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         scanned = scan_workpiece(scan, asked, out, lambda label: progress_line(label, sys.stderr))
         save_scan(out / "scan.json", scan_document(scanned))
-        write_whole(out / "report.html", scan_report(scanned))
+        write_whole(out / "report.html", scan_report(scanned, Origin(arguments.command_line)))
     except TableError as error:
         raise PlannerError(str(error)) from error
     except OSError as error:

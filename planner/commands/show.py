@@ -9,18 +9,28 @@ from planner.errors import PlannerError
 from planner.execution.run_file import load_run
 from planner.execution.run_report import run_report
 from planner.execution.run_verification import verify_run
+from protocol.page import Origin
 from protocol.whole_file import write_whole
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the page, print its name, and return the exit status."""
-    stored = load_run(arguments.folder)
-    conditions = stored.conditions
-    checked = verify_run(stored.run_input, stored.motion, stored.record, conditions.lead_s, conditions.tolerance_deg)
     page: Path = arguments.out or arguments.folder / REPORT_FILE
-    try:
-        write_whole(page, run_report(stored, checked))
-    except OSError as error:
-        raise PlannerError(f"{page}: the page cannot be written there ({error.strerror or error})") from error
+    write_report(arguments.folder, page, arguments.command_line)
     sys.stdout.write(f"{page}\n")
     return 0
+
+
+def write_report(folder: Path, page: Path, command: str) -> None:
+    """Write the page of the run in a folder; `command` is the command line that asks for it.
+
+    Raises:
+        PlannerError: the folder holds no run, or the page cannot be written.
+    """
+    stored = load_run(folder)
+    conditions = stored.conditions
+    checked = verify_run(stored.run_input, stored.motion, stored.record, conditions.lead_s, conditions.tolerance_deg)
+    try:
+        write_whole(page, run_report(stored, checked, Origin(command)))
+    except OSError as error:
+        raise PlannerError(f"{page}: the page cannot be written there ({error.strerror or error})") from error

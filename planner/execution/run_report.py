@@ -1,11 +1,12 @@
-"""A run as one HTML file that needs nothing else: verdict, figures, pictures as inline SVG, and all commands."""
+"""A run as one HTML page: verdict, figures, pictures as inline SVG, and all commands."""
 
 from collections.abc import Iterator
 
 from planner.execution.run_file import StoredRun
-from planner.execution.run_plots import deviation_figure, figure_style, map_figure, motion_figure
+from planner.execution.run_plots import deviation_figure, map_figure, motion_figure
 from planner.execution.run_verification import RunVerification
-from planner.page import details, drawing, heading, note, page, table, verdict
+from planner.plot_style import svg_of
+from protocol.page import Origin, counted, details, figure, heading, page, paragraph, table, verdict
 
 _NAMES = {
     "encoder": "encoder",
@@ -16,45 +17,45 @@ _NAMES = {
 }
 
 
-def run_report(run: StoredRun, checked: RunVerification) -> str:
+def run_report(run: StoredRun, checked: RunVerification, origin: Origin | None = None) -> str:
     """Return the page of a run."""
-    with figure_style():
-        on_map = drawing(map_figure(run, checked))
-        motion = drawing(motion_figure(run))
-        deviation = drawing(deviation_figure(run, checked))
     wire = run.conditions.wire
     blocks = (
         verdict(checked.verdict, checked.is_verified),
-        table(("", ""), list(_summary(run, checked))),
+        table(("", ""), list(_summary(run, checked)), words=True),
         heading("On the configuration map"),
-        note("Grey is allowed, the whiter the better; colours are forbidden. Both paths wrap at 360 degrees."),
-        on_map,
+        paragraph("Gray is allowed, the whiter the better; colors are forbidden. Both paths wrap at 360 deg."),
+        figure(svg_of(map_figure(run, checked)), "Configuration map with the planned and the executed path."),
         heading("Motion"),
-        motion,
+        figure(svg_of(motion_figure(run)), "Planned and executed angle and speed of the table over time."),
         heading("Deviation from the plan"),
-        note(
-            f"The dashed lines are the tolerance at the scan locations. L and H carry {wire.decimals} decimal(s), so up"
-            f" to {0.5 * wire.quantum:g} deg of their deviation is rounding. The true angle differs from the encoder's"
-            " by the backlash of the gears."
+        paragraph(
+            "The dashed lines are the tolerance at the scan locations."
+            f" L and H carry {counted(wire.decimals, 'decimal')}:"
+            f" up to {0.5 * wire.quantum:g} deg of their deviation is rounding."
+            " The true angle differs from the encoder's by the backlash of the gears."
         ),
-        deviation,
-        table(("in degrees", "at the locations", "anywhere", "rms"), list(_deviations(checked))),
+        figure(
+            svg_of(deviation_figure(run, checked)),
+            f"Executed minus planned angle over time; {checked.worst_deg:.3f} deg at most at the locations.",
+        ),
+        table(("", "at the locations (deg)", "anywhere (deg)", "rms (deg)"), list(_deviations(checked))),
         heading("Cost, Eq. (7)"),
         table(("", "acceleration", "speed", "value", "pauses", "total"), list(_costs(checked))),
         heading("Commands"),
-        details(f"all {len(run.record.sent)} motion commands", _commands(run)),
+        details(f"all {counted(len(run.record.sent), 'motion command')}", _commands(run)),
         _corrections(run),
     )
-    return page(f"Run of {run.run_input.name}", blocks)
+    return page(f"Run of {run.run_input.name}", blocks, origin)
 
 
 def _summary(run: StoredRun, checked: RunVerification) -> Iterator[tuple[str, str]]:
     plan, conditions = run.run_input.plan, run.conditions
     yield "planned by", f"{plan.planner}, {plan.configuration}"
-    yield "locations", f"{len(plan.angles_deg)}, one every {plan.step_s:g} s, {len(plan.pauses)} pauses"
-    yield "port", f"{conditions.port}, {conditions.wire.baud} baud, {conditions.wire.decimals} decimal(s)"
+    yield "locations", f"{len(plan.angles_deg)}, one every {plan.step_s:g} s, {counted(len(plan.pauses), 'pause')}"
+    yield "port", f"{conditions.port}, {conditions.wire.baud} baud, {counted(conditions.wire.decimals, 'decimal')}"
     yield "encoder at the locations", f"{checked.worst_deg:.3f} deg off at most, {checked.tolerance_deg:g} allowed"
-    yield "forbidden cells touched in", f"{len(checked.forbidden_steps)} steps"
+    yield "forbidden cells touched in", counted(len(checked.forbidden_steps), "step")
     yield "margin left to a forbidden cell", f"{checked.margin_deg:.2f} deg"
     yield "latest command", f"{1000.0 * checked.latest_command_s:.1f} ms late"
     yield "locations without a trigger", f"{len(checked.missing_triggers)}"
@@ -90,6 +91,6 @@ def _commands(run: StoredRun) -> str:
 def _corrections(run: StoredRun) -> str:
     corrections = run.record.corrections
     if not corrections:
-        return note("Neither drift nor late commands had to be corrected.")
+        return paragraph("Neither drift nor late commands had to be corrected.")
     times = ", ".join(f"{each.time_s:.1f} s ({each.slip_deg:+.2f} deg)" for each in corrections)
-    return note(f"For drift or a late command the stream was computed anew at {times}.")
+    return paragraph(f"For drift or a late command the stream was computed anew at {times}.")

@@ -16,7 +16,7 @@ import numpy as np
 from planner.errors import PlannerError
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap, ConfigurationMapError
-from planner.software_version import software_version
+from protocol.software_version import software_version
 from protocol.whole_file import whole_file
 
 MAP_FILE = "map.npz"

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
@@ -15,54 +14,67 @@ from matplotlib.ticker import MaxNLocator
 from planner.arrays import FloatArray
 from planner.map.config_map import ConfigurationMap
 from planner.map.map_colours import DARKEST_GRAY, LegendEntry, coloured
-from protocol.whole_file import whole_file
+from planner.plot_style import INK, VERMILION, new_figure, save_picture, styled
 
-_DPI = 120
 _LEGEND_COLUMNS = 3
-_INK = "#333333"
-_BLOCKED = "#d00000"
 _SAMPLES = 3
 """Samples per pixel and direction in the tube's picture."""
 
 
 def plot_map(configuration_map: ConfigurationMap, file: Path) -> None:
-    """Write the map as a flat picture: location to the right, table angle upwards; Fig. 6a of the paper."""
-    image, legend = coloured(configuration_map)
-    rows = ceil(len(legend) / _LEGEND_COLUMNS)
-    figure = Figure(figsize=(8.0, 4.9 + 0.22 * rows), dpi=_DPI, layout="constrained")
+    """Write the map as a flat picture."""
+    save_picture(map_figure(configuration_map), file)
+
+
+@styled()
+def map_figure(configuration_map: ConfigurationMap) -> Figure:
+    """Return the map as a flat picture: location to the right, table angle upwards; Fig. 6a of the paper."""
+    legend = coloured(configuration_map)[1]
+    figure = new_figure(5.0 + legend_height_in(legend))
     axes = figure.add_subplot()
-    count, half_step = configuration_map.location_count, configuration_map.angle_step_deg / 2
-    axes.imshow(
-        image,
-        origin="lower",
-        aspect="auto",
-        interpolation="nearest",
-        extent=(-0.5, count - 0.5, -half_step, 360.0 - half_step),
-    )
-    axes.set_xlabel("scan location", color=_INK)
-    axes.set_ylabel("table angle [deg]", color=_INK)
-    axes.set_yticks(range(0, 361, 45))
-    axes.set_ylim(-half_step, 360.0 - half_step)
-    axes.xaxis.set_major_locator(MaxNLocator(10, integer=True))
-    _mark_blocked(axes, configuration_map)
-    _tidy(axes)
+    draw_map(axes, configuration_map)
+    axes.set_xlabel("scan location")
     _title(figure, configuration_map)
-    _grays(figure, axes)
-    _legend(figure, legend)
-    _save(figure, file)
+    draw_grays(figure, axes)
+    draw_legend(figure, legend)
+    return figure
 
 
+def draw_map(axes: Axes, configuration_map: ConfigurationMap) -> None:
+    """Draw the map in its colors, with a mark above each location that no table angle serves."""
+    image, _ = coloured(configuration_map)
+    half_step = configuration_map.angle_step_deg / 2
+    extent = (-0.5, configuration_map.location_count - 0.5, -half_step, 360.0 - half_step)
+    axes.imshow(image, origin="lower", aspect="auto", extent=extent)
+    axes.set(ylabel="table angle (deg)", yticks=range(0, 361, 60), ylim=extent[2:])
+    axes.grid(visible=False)
+    axes.xaxis.set_major_locator(MaxNLocator(10, integer=True))
+    blocked = configuration_map.blocked_locations
+    axes.plot(
+        blocked,
+        [1.012] * len(blocked),
+        marker="v",
+        markersize=4,
+        linestyle="none",
+        color=VERMILION,
+        transform=axes.get_xaxis_transform(),
+        clip_on=False,
+        in_layout=False,
+        label="_",
+    )
+
+
+@styled()
 def plot_map_cylinder(configuration_map: ConfigurationMap, file: Path) -> None:
     """Write the map rolled up and seen from two sides, since the table turns without end; Fig. 6b of the paper."""
     image, legend = coloured(configuration_map)
-    rows = ceil(len(legend) / _LEGEND_COLUMNS)
-    figure = Figure(figsize=(8.0, 6.6 + 0.22 * rows), dpi=_DPI, layout="constrained")
+    figure = new_figure(6.6 + legend_height_in(legend), 8.0)
     for axes, centre_deg in zip(figure.subplots(2, 1), (180.0, 0.0), strict=True):
         _draw_tube(axes, image, centre_deg)
     _title(figure, configuration_map)
-    _grays(figure, figure.axes[:2])
-    _legend(figure, legend)
-    _save(figure, file)
+    draw_grays(figure, figure.axes[:2])
+    draw_legend(figure, legend)
+    save_picture(figure, file)
 
 
 _LENGTH = 4.0
@@ -77,22 +89,21 @@ def _draw_tube(axes: Axes, image: FloatArray, centre_deg: float) -> None:
         extent=(-_BULGE, _LENGTH + _BULGE, -1.0, 1.0),
         origin="lower",
         aspect="equal",
-        interpolation="nearest",
     )
     count = image.shape[1]
     for location in MaxNLocator(10, integer=True).tick_values(0, count - 1):
         if 0 <= location <= count - 1:
             x = _LENGTH * (location + 0.5) / count
-            axes.plot([x, x], [-1.0, -1.06], color=_INK, linewidth=0.8, clip_on=False)
-            axes.text(x, -1.1, f"{location:.0f}", ha="center", va="top", fontsize=9, color=_INK)
+            axes.plot([x, x], [-1.0, -1.06], color=INK, linewidth=0.8, clip_on=False)
+            axes.text(x, -1.1, f"{location:.0f}", ha="center", va="top", fontsize=9, color=INK)
     for offset_deg in range(-90, 91, 45):
         y, z = np.sin(np.radians(offset_deg)), np.cos(np.radians(offset_deg))
         rim = -_BULGE * z
-        axes.plot([rim - 0.06, rim], [y, y], color=_INK, linewidth=0.8, clip_on=False)
-        angle = f"{(centre_deg + offset_deg) % 360.0:.0f}°"
-        axes.text(rim - 0.1, y, angle, ha="right", va="center", fontsize=9, color=_INK)
-    axes.text(_LENGTH / 2, -1.32, "scan location", ha="center", va="top", fontsize=10, color=_INK)
-    axes.text(-0.85, 0.0, "table angle", ha="center", va="center", rotation=90, fontsize=10, color=_INK)
+        axes.plot([rim - 0.06, rim], [y, y], color=INK, linewidth=0.8, clip_on=False)
+        angle = f"{(centre_deg + offset_deg) % 360.0:.0f}"
+        axes.text(rim - 0.1, y, angle, ha="right", va="center", fontsize=9, color=INK)
+    axes.text(_LENGTH / 2, -1.32, "scan location", ha="center", va="top", fontsize=10, color=INK)
+    axes.text(-0.85, 0.0, "table angle (deg)", ha="center", va="center", rotation=90, fontsize=10, color=INK)
     axes.set_xlim(-0.95, _LENGTH + _BULGE)
     axes.set_ylim(-1.5, 1.05)
     axes.set_axis_off()
@@ -124,64 +135,36 @@ def _tube(image: FloatArray, centre_deg: float, width: int, height: int) -> Floa
     return np.dstack([np.clip(colour, 0.0, 1.0), cover])
 
 
-def _mark_blocked(axes: Axes, configuration_map: ConfigurationMap) -> None:
-    """Put a mark above each location that no table angle serves."""
-    blocked = configuration_map.blocked_locations
-    axes.plot(
-        blocked,
-        [1.012] * len(blocked),
-        marker="v",
-        markersize=4,
-        linestyle="none",
-        color=_BLOCKED,
-        transform=axes.get_xaxis_transform(),
-        clip_on=False,
-        in_layout=False,
-    )
-
-
-def _tidy(axes: Axes) -> None:
-    axes.tick_params(colors=_INK, labelsize=9)
-    for spine in axes.spines.values():
-        spine.set_color("#888888")
-
-
 def _title(figure: Figure, configuration_map: ConfigurationMap) -> None:
     named = (configuration_map.metadata.get(key) for key in ("scan", "configuration"))
     blocked = len(configuration_map.blocked_locations)
     served = f"{configuration_map.location_count - blocked} of {configuration_map.location_count} locations reachable"
-    figure.suptitle("   ".join([*(str(name) for name in named if name), served]), fontsize=11, color=_INK)
+    figure.suptitle("   ".join([*(str(name) for name in named if name), served]), fontsize=11)
 
 
-def _grays(figure: Figure, axes: Axes | list[Axes]) -> None:
+def draw_grays(figure: Figure, axes: Axes | list[Axes]) -> None:
+    """Draw the scale of the allowed cells beside the axes."""
     grays = LinearSegmentedColormap.from_list("f_R", [(DARKEST_GRAY,) * 3, (1.0, 1.0, 1.0)])
     bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), grays), ax=axes, fraction=0.03, pad=0.02)
-    bar.set_label("value $f_R$ where allowed", color=_INK)
-    bar.ax.tick_params(colors=_INK, labelsize=9)
+    bar.set_label("value $f_R$ where allowed")
 
 
-def _legend(figure: Figure, legend: list[LegendEntry]) -> None:
-    if not legend:
-        return
-    figure.legend(
-        [Patch(facecolor=entry.colour) for entry in legend],
-        [f"{entry.text} ({_percent(entry.share)})" for entry in legend],
-        loc="outside lower center",
-        ncols=min(_LEGEND_COLUMNS, len(legend)),
-        frameon=False,
-        fontsize=9,
-        title="forbidden, by reason",
-        title_fontsize=9,
-        labelcolor=_INK,
-    )
+def legend_height_in(legend: list[LegendEntry]) -> float:
+    """Return the height that `draw_legend` needs."""
+    return 0.22 * ceil(len(legend) / _LEGEND_COLUMNS)
+
+
+def draw_legend(figure: Figure, legend: list[LegendEntry]) -> None:
+    """Draw below the figure what the colors of the forbidden cells mean."""
+    if legend:
+        figure.legend(
+            [Patch(facecolor=entry.colour) for entry in legend],
+            [f"{entry.text} ({_percent(entry.share)})" for entry in legend],
+            loc="outside lower center",
+            ncols=min(_LEGEND_COLUMNS, len(legend)),
+            title="forbidden, by reason (share of the map)",
+        )
 
 
 def _percent(share: float) -> str:
     return f"{share:.1%}" if share >= 0.001 else "< 0.1%"
-
-
-def _save(figure: Figure, file: Path) -> None:
-    FigureCanvasAgg(figure)
-    with whole_file(file) as partial:
-        # Without the library's name and version the same map stays the same bytes.
-        figure.savefig(partial, metadata={"Software": None})

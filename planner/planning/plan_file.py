@@ -14,9 +14,9 @@ from planner.planning.arm_motion import ArmMotion
 from planner.planning.plan import Pause, Plan
 from planner.planning.problem import Problem
 from planner.planning.verification import verify
-from planner.software_version import software_version
 from planner.table.cost import PathCost
 from protocol.data_file import DataFileError, read_json
+from protocol.software_version import software_version
 from protocol.whole_file import write_whole
 
 _FORMAT = "seventh-axis plan"

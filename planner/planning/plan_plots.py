@@ -1,59 +1,78 @@
 """A plan's picture: the map with the path, the speed and the acceleration (Fig. 7 and 9)."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import Normal, Stroke
 
 from planner.arrays import FloatArray
-from planner.planning.plan import Plan
+from planner.map.map_colours import coloured
+from planner.map.map_plots import draw_grays, draw_legend, draw_map, legend_height_in
+from planner.planning.plan import Pause, Plan
 from planner.planning.problem import Problem
-from protocol.whole_file import whole_file
+from planner.plot_style import BLUE, LIMIT, SKY, VERMILION, new_figure, save_picture, styled
 
-PLAN_COLOUR, CURVE_COLOUR, PAUSE_COLOUR = "#d62728", "#1f77b4", "#e7a33e"
-_DPI = 120
+PATH: dict[str, Any] = {
+    "color": VERMILION,
+    "linewidth": 2.6,
+    "path_effects": [Stroke(linewidth=4.6, foreground="white"), Normal()],
+}
+"""A plan on its map, with a white edge: the map's colors may be near to its own."""
 
 
+@styled()
 def plan_figure(problem: Problem, plan: Plan, title: str) -> Figure:
     """Return a plan on its map, with its speed, its acceleration, the limits and the pauses."""
-    figure = Figure(figsize=(7.2, 8.4), dpi=_DPI, layout="constrained")
-    on_map, speed, acceleration = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
-    step_deg = problem.map.angle_step_deg
-    extent = (-0.5, problem.map.location_count - 0.5, -0.5 * step_deg, 360.0 - 0.5 * step_deg)
-    on_map.imshow(problem.map.values.T, cmap="gray", vmin=0.0, vmax=1.0, origin="lower", aspect="auto", extent=extent)
-    draw_wrapped(on_map, plan.angles_deg)
-    on_map.set(ylabel="table angle (deg)", yticks=range(0, 361, 60), title=title)
+    legend = coloured(problem.map)[1]
+    figure = new_figure(8.6 + legend_height_in(legend))
+    on_map, speed, acceleration = figure.subplots(3, 1, sharex=True, height_ratios=(2.2, 1.0, 1.0))
+    draw_map(on_map, problem.map)
+    draw_path(on_map, plan.angles_deg, **PATH)
+    on_map.set_title(title)
+    draw_grays(figure, on_map)
+    draw_legend(figure, legend)
     draw_motion(speed, acceleration, problem, plan)
     return figure
 
 
 def plot_plan(problem: Problem, plan: Plan, title: str, file: Path) -> None:
     """Write the picture of a plan to `file`, which appears when it is whole."""
-    with whole_file(file) as partial:
-        plan_figure(problem, plan, title).savefig(partial, format="png", metadata={"Software": None})
+    save_picture(plan_figure(problem, plan, title), file)
 
 
-def draw_wrapped(axes: Axes, angles_deg: FloatArray) -> None:
-    """Draw a path wrapped to one turn, interrupted where it passes 0."""
-    turn = np.floor(angles_deg / 360.0)
-    for value in np.unique(turn):
-        beside = (turn == value) | (np.roll(turn, 1) == value) | (np.roll(turn, -1) == value)
-        axes.plot(np.where(beside, angles_deg - 360.0 * value, np.nan), color=PLAN_COLOUR, linewidth=2.0)
+def draw_path(axes: Axes, angles_deg: FloatArray, label: str = "_", **line: Any) -> None:  # noqa: ANN401  # matplotlib's
+    """Draw a path `(n,)` over the map, wrapped to one turn: each turn it is in is a line of its own.
+
+    What lies outside the axes does not show; NaN interrupts the path.
+    """
+    columns = np.arange(len(angles_deg))
+    known = angles_deg[np.isfinite(angles_deg)]
+    if not len(known):
+        return
+    for turn in range(int(np.floor(known.min() / 360.0)), int(np.floor(known.max() / 360.0)) + 1):
+        axes.plot(columns, angles_deg - 360.0 * turn, **line, label=label)
+        label = "_"
     axes.set_ylim(0.0, 359.9)
 
 
 def draw_motion(speed: Axes, acceleration: Axes, problem: Problem, plan: Plan) -> None:
     """Draw speed and acceleration between their limits, and mark the pauses."""
     locations = np.arange(len(plan.angles_deg))
-    speed.plot(locations, plan.speeds_deg_s, color=CURVE_COLOUR)
+    speed.plot(locations, plan.speeds_deg_s, color=BLUE)
     speed.set_ylabel("speed (deg/s)")
-    acceleration.stairs(plan.accelerations_deg_s2, locations, color=CURVE_COLOUR, baseline=None)
-    acceleration.set(ylabel="acceleration (deg/s$^2$)", xlabel="scan location")
+    acceleration.stairs(plan.accelerations_deg_s2, locations, color=BLUE, baseline=None)
+    acceleration.set(ylabel="acceleration (deg/s2)", xlabel="scan location")
     for axes, limit in ((speed, problem.limits.speed_deg_s), (acceleration, problem.limits.acceleration_deg_s2)):
         axes.set_ylim(-1.1 * limit, 1.1 * limit)
         for bound in (-limit, limit):
-            axes.axhline(bound, color="#888888", linestyle="--", linewidth=0.8)
-        axes.grid(visible=True, alpha=0.3)
-        for pause in plan.pauses:
-            axes.axvline(pause.step + 0.5, color=PAUSE_COLOUR, linewidth=1.0)
+            axes.axhline(bound, **LIMIT)
+        mark_pauses(axes, plan.pauses)
+
+
+def mark_pauses(axes: Axes, pauses: tuple[Pause, ...]) -> None:
+    """Mark the steps in which the table turns while the arm is away."""
+    for pause in pauses:
+        axes.axvline(pause.step + 0.5, color=SKY, linewidth=1.0)

@@ -61,9 +61,9 @@ class Problem:
             raise ProblemError("the map has 1 location; a path needs at least 2")
         _check_positive("time step", "s", self.step_s)
         _check_positive("speed limit", "deg/s", self.limits.speed_deg_s)
-        _check_positive("acceleration limit", "deg/s^2", self.limits.acceleration_deg_s2)
+        _check_positive("acceleration limit", "deg/s2", self.limits.acceleration_deg_s2)
         weights = default_weights(self.limits) if self.weights is None else self.weights
-        _check_weight("acceleration", "1/(deg/s^2)^2", weights.acceleration)
+        _check_weight("acceleration", "1/(deg/s2)^2", weights.acceleration)
         _check_weight("speed", "1/(deg/s)^2", weights.speed)
         if costs_overflow(weights, self.limits, self.map.location_count):
             raise ProblemError("the weights are so large that the cost of a path overflows; lower them")

@@ -1,48 +1,56 @@
-"""A scan as one HTML file: verdict, cloud, error account, coverage, and what went missing."""
+"""A scan as one HTML page: verdict, cloud, error account, coverage, and what went missing."""
 
 from collections import Counter
 from collections.abc import Iterator
 
-from planner.page import heading, note, page, picture, table, verdict
+from planner.plot_style import svg_of
 from planner.scanning.calibration import AxisCalibration
 from planner.scanning.coverage import REASONS
+from planner.scanning.deviation_plots import deviation_figure
 from planner.scanning.error_account import Account, Contribution
 from planner.scanning.probe import Sight
 from planner.scanning.probe_calibration import ProbeCalibration
-from planner.scanning.scan_plots import STATE_NAMES, account_figure, cloud_figure, coverage_figure
+from planner.scanning.scan_plots import STATE_NAMES, account_figure, coverage_figure
 from planner.scanning.scan_run import COVERED_MM, Scanned
+from protocol.page import Origin, counted, figure, heading, page, paragraph, table, verdict
 
 _MICROMETRES = 1e3
 
 
-def scan_report(scanned: Scanned) -> str:
+def scan_report(scanned: Scanned, origin: Origin | None = None) -> str:
     """Return the page of a scan."""
     mesh, accounted = scanned.scan.mesh, scanned.account
     blocks = (
         verdict(verdict_of(scanned), scanned.is_whole),
         table(("", ""), list(_summary(scanned)), words=True),
         heading("The cloud"),
-        note("Grey is the part itself; colour is where it was measured, and how far the cloud lies from the surface."),
-        picture(cloud_figure(mesh, accounted), "the point cloud on the part, from two sides"),
-        table(("in micrometres", "mean", "sigma", "95 % within", "greatest"), [_distances(accounted)]),
+        paragraph("Color is how far the cloud lies from the surface, averaged nearby; gray was not measured."),
+        figure(
+            svg_of(deviation_figure(mesh, accounted)),
+            f"Deviation of the cloud from the surface; {_um(accounted.distances.greatest)} µm at most at one point.",
+        ),
+        table(("", "mean (µm)", "sigma (µm)", "95 % within (µm)", "maximum (µm)"), [_distances(accounted)]),
         heading("Where the error comes from"),
-        note(_explanation(scanned)),
-        picture(account_figure(accounted), "what each part contributes, and the distribution of the distances"),
+        paragraph(_explanation(scanned)),
+        figure(svg_of(account_figure(accounted)), "What each source of error contributes; distribution of distances."),
         _account_table(accounted),
-        note(_rounding(scanned)),
+        paragraph(_rounding(scanned)),
         heading("Coverage"),
-        note(
+        paragraph(
             f"A place counts as seen when a profile passes within {0.5 * COVERED_MM:g} mm and can measure it there."
             " All of the surface counts, the underside too."
         ),
-        picture(coverage_figure(mesh, scanned.coverage), "which places were seen, and why not the others"),
+        figure(
+            svg_of(coverage_figure(mesh, scanned.coverage)),
+            f"The part from two sides: {scanned.coverage.shares()[Sight.SEEN]:.1%} of its surface seen.",
+        ),
         table(("of the surface", "share", "which means"), list(_coverage(scanned)), words=True),
         heading("Calibration"),
         _calibration(scanned),
         heading("Profiles"),
         table(("", ""), list(_profiles(scanned))),
     )
-    return page(f"Scan of {scanned.scan.name}", blocks)
+    return page(f"Scan of {scanned.scan.name}", blocks, origin)
 
 
 def verdict_of(scanned: Scanned) -> str:
@@ -53,10 +61,11 @@ def verdict_of(scanned: Scanned) -> str:
         ended = f" It ended early: {scanned.run.failure}."
     elif scanned.is_interrupted:
         ended = " It was interrupted."
+    distances, moved = accounted.distances, accounted.total.displacement_mm
     return (
-        f"{scanned.points:,} points from {len(scanned.run.numbers):,} profiles: {_um(accounted.distances.sigma)} µm"
-        f" (1 sigma) from the surface, {_um(accounted.total.displacement_mm)} µm (rms) from where they truly lie;"
-        f" {seen:.1%} of the surface seen.{ended}"
+        f"{scanned.points:,} points from {counted(len(scanned.run.numbers), 'profile')}: {_um(distances.sigma)} µm"
+        f" (1 sigma) from the surface, {_um(distances.greatest)} µm at most, {_um(moved)} µm (rms) from where they"
+        f" truly lie; {seen:.1%} of the surface seen.{ended}"
     )
 
 
@@ -67,8 +76,8 @@ def _um(length_mm: float, decimals: int = 1) -> str:
 def _summary(scanned: Scanned) -> Iterator[tuple[str, str]]:
     plan, options = scanned.planned.plan, scanned.options
     yield "planned by", f"{plan.planner}, {plan.configuration}"
-    yield "locations", f"{len(plan.angles_deg)}, one every {plan.step_s:g} s, {len(plan.pauses)} pauses"
-    yield "port", f"{options.port}, {options.baud} baud, {options.decimals} decimal(s)"
+    yield "locations", f"{len(plan.angles_deg)}, one every {plan.step_s:g} s, {counted(len(plan.pauses), 'pause')}"
+    yield "port", f"{options.port}, {options.baud} baud, {counted(options.decimals, 'decimal')}"
     yield "probe", f"{options.triggers.rate_hz:g} profiles a second, {scanned.probe.points_per_line} points each"
     yield "workpiece", f"{len(scanned.scan.mesh.faces):,} triangles"
     yield "seed", f"{options.seed}"
@@ -103,7 +112,7 @@ def _account_table(accounted: Account) -> str:
         ("root of the sum of squares", _um(accounted.sum_mm, 2), "", ""),
         ("all switched off", f"{_MICROMETRES * accounted.none_mm:.1g}", "", ""),
     ]
-    return table(("rms, in micrometres", "displacement alone", "across the surface", "left without it"), rows, 3)
+    return table(("rms", "displacement alone (µm)", "across the surface (µm)", "left without it (µm)"), rows, 3)
 
 
 def _rounding(scanned: Scanned) -> str:
@@ -125,7 +134,7 @@ def _coverage(scanned: Scanned) -> Iterator[tuple[str, str, str]]:
 def _calibration(scanned: Scanned) -> str:
     axis, probe = scanned.knowledge.axis, scanned.knowledge.probe
     if axis is None or probe is None:
-        return note("The placements of the scan file were taken as exactly known.")
+        return paragraph("The placements of the scan file were taken as exactly known.")
     wrong = f"{probe.wrong_starts} of {probe.starts} starts ended in a false minimum"
     radius = f"the sphere's radius fits as {probe.fitted_radius_mm:.4f} ± {probe.radius_uncertainty_mm:.4f} mm"
     rows = [
@@ -133,7 +142,7 @@ def _calibration(scanned: Scanned) -> str:
         ("probe on the flange", _um(probe.rms_mm), f"{len(probe.residuals_mm):,} points", *_uncertainty(probe),
          f"residual {probe.noise_ratio:.2f} times the noise; {radius}; {wrong}"),
     ]  # fmt: skip
-    return table(("", "residual (µm, rms)", "from", "uncertainty (1 sigma)", "moves a point by", ""), rows, words=True)
+    return table(("", "residual, rms (µm)", "from", "uncertainty (1 sigma)", "moves a point by", ""), rows, words=True)
 
 
 def _uncertainty(found: AxisCalibration | ProbeCalibration) -> tuple[str, str]:

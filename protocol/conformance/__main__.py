@@ -29,7 +29,7 @@ Exit status: 0 when no case failed, 1 when one did, 2 when the table could not b
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     try:
-        options = parser().parse_args(arguments)
+        options = parser().read(arguments)
         cases = _chosen(options.case)
         if options.list:
             return _list(cases)

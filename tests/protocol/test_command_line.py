@@ -44,3 +44,11 @@ def test_a_subcommand_is_read_by_the_same_parser(capsys: pytest.CaptureFixture[s
     with pytest.raises(SystemExit):
         parser.parse_args(["part"])
     assert capsys.readouterr().err.startswith("example part: ")
+
+
+def test_the_whole_command_line_is_kept_as_a_shell_reads_it() -> None:
+    parser = Parser(prog="python -m tools.tune")
+    parser.add_argument("--out")
+    options = parser.read(["--out", "a folder"])
+    assert options.out == "a folder"
+    assert options.command_line == "python -m tools.tune --out 'a folder'"

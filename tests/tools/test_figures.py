@@ -13,6 +13,7 @@ from tools.figures import (
     FIGURES,
     MOMENTS,
     OBSTACLE_RAYS,
+    OBSTACLES,
     SHARED_SPEED_COUNT,
     SHARED_WORK,
     complete_rays,
@@ -25,12 +26,16 @@ from tools.figures import (
 SECOND_OBSTACLE_DEG, SECOND_OBSTACLE_LOCATION = (54.0, 144.0), 64
 
 
+def shot() -> Plan:
+    """Return the plan of Fig. 8."""
+    plan = ray_shooting(obstacle_problem(), OBSTACLE_RAYS)
+    assert isinstance(plan, Plan)
+    return plan
+
+
 def ways_at(moment: int) -> set[str]:
     """Return on which sides of the second obstacle the rays from the plan's state at a moment get past both."""
-    problem = obstacle_problem()
-    plan = ray_shooting(problem, OBSTACLE_RAYS)
-    assert isinstance(plan, Plan)
-    rays = complete_rays(problem, plan, moment)
+    rays = complete_rays(obstacle_problem(), shot(), moment)
     at_obstacle = [ray[min(SECOND_OBSTACLE_LOCATION - moment, len(ray) - 1)] for ray in rays]
     return {"left" if angle < SECOND_OBSTACLE_DEG[0] else "between" for angle in at_obstacle}
 
@@ -42,8 +47,7 @@ def test_the_rays_first_see_a_way_left_of_both_obstacles_then_one_between_them()
 
 def test_of_the_two_ways_the_cheaper_is_taken_and_the_rotation_reverses() -> None:
     problem = obstacle_problem()
-    plan = ray_shooting(problem, OBSTACLE_RAYS)
-    assert isinstance(plan, Plan)
+    plan = shot()
     accelerations = ray_accelerations(OBSTACLE_RAYS.rays, problem.limits.acceleration_deg_s2)
     chosen = []
     for moment in MOMENTS[:2]:
@@ -95,3 +99,29 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path, capsys: pytest.
 
 def test_every_figure_of_the_planner_is_there() -> None:
     assert list(FIGURES) == [f"fig{number}" for number in np.arange(5, 10)]
+
+
+def test_the_captions_of_fig_8_are_true() -> None:
+    figure = FIGURES["fig8"]()
+    drawn = [{str(line.get_label()): line.get_xydata() for line in axes.lines} for axes in figure.axes]
+    cheapest = [dict(np.asarray(each["cheapest ray"])) for each in drawn]
+    captions = [axes.get_title() for axes in figure.axes]
+    free = complete_rays(obstacle_problem(), shot(), MOMENTS[0])
+
+    assert "every free ray passes below both" in captions[0]
+    first, second = ((first, first_angle * 3.0) for first, _, first_angle, _ in OBSTACLES)
+    assert all(ray[first[0]] < first[1] and ray[second[0]] < second[1] for ray in free)
+    assert "the cheapest ray passes between" in captions[1]
+    assert "above the second" in captions[2]
+    for ray in cheapest[1:3]:
+        assert ray[SECOND_OBSTACLE_LOCATION] > SECOND_OBSTACLE_DEG[1]
+    assert cheapest[1][MOMENTS[2]] < first[1]
+    assert "past both" in captions[3]
+    assert MOMENTS[3] > max(last for _, last, *_ in OBSTACLES)
+
+
+@pytest.mark.parametrize("name", ["fig5", "fig6", "fig8", "fig9"])
+def test_a_figure_has_its_number_in_its_title(name: str) -> None:
+    figure = FIGURES[name]()
+    titles = [figure.get_suptitle(), *(axes.get_title() for axes in figure.axes)]
+    assert sum(title.startswith(f"Fig. {name[3:]}: ") for title in titles) == 1

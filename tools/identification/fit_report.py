@@ -4,8 +4,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from emulator.config.table_config import TableConfig
+from planner.plot_style import BLUE, EXECUTED, PLANNED, new_figure, styled, svg_of
+from protocol.page import Marked, Origin, counted, figure, heading, page, paragraph, table
+from protocol.page import verdict as headline
 from tools.config_file import config_toml
-from tools.html_report import BLUE, ORANGE, figure_block, heading, new_figure, page, paragraph, svg_of, table_block
 from tools.identification.constants import Constant
 from tools.identification.fit_checks import MOST_UNEXPLAINED_DEG, halves_of, unexplained_rms_deg
 from tools.identification.identify_table import Identified
@@ -30,14 +32,16 @@ def table_toml(found: Identified, warning: str = "") -> str:
     return config_toml(found.config, "\n".join(lines), always=estimated)
 
 
-def fit_report(found: Identified, assumed: TableConfig, source: str, warning: str = "") -> str:
+def fit_report(
+    found: Identified, assumed: TableConfig, source: str, warning: str = "", origin: Origin | None = None
+) -> str:
     """Return the report as HTML."""
     rows = [
         (
-            f"{constant.name}, {constant.unit}",
+            f"{constant.name} ({constant.unit})",
             f"{constant.value:.4g}",
             f"{constant.low:.4g} .. {constant.high:.4g}",
-            "+identifiable" if constant.identifiable else "not identifiable",
+            Marked("identifiable", "good") if constant.identifiable else "not identifiable",
         )
         for constant in found.constants
     ]
@@ -45,29 +49,27 @@ def fit_report(found: Identified, assumed: TableConfig, source: str, warning: st
     return page(
         "Identified table",
         [
-            paragraph(f"From {source}: {len(found.time_s)} readings used, over {found.time_s[-1]:.1f} s.", "lead"),
-            paragraph(_believed(found), "good"),
+            headline(_believed(found), is_good=True),
+            paragraph(f"From {source}: {counted(len(found.time_s), 'reading')} used, over {found.time_s[-1]:.1f} s."),
             paragraph(
                 f"Not identifiable from this recording: {', '.join(missing)}. Their values are mostly what was assumed."
                 if missing
-                else "Every constant is identifiable.",
-                "" if missing else "good",
+                else "Every constant is identifiable."
             ),
             *([paragraph(f"Warning: {warning}.")] if warning else []),
             heading("Constants, with 95 % confidence intervals"),
-            table_block(("constant", "estimate", "interval", ""), rows),
+            table(("constant", "estimate", "interval", ""), rows),
             paragraph(
                 "The intervals hold for the model's structure and for what was assumed: motion alone cannot tell "
                 f"the motor's resistance, so torques and inertias hold for the assumed "
-                f"{assumed.motor.resistance_ohm:g} ohm.",
-                "quiet",
+                f"{assumed.motor.resistance_ohm:g} ohm."
             ),
             heading("The halves of the recording"),
-            table_block(
-                ("constant", "first half", "second half", "difference, standard deviations", "allowed"),
+            table(
+                ("constant", "first half", "second half", "difference (standard deviations)", "allowed"),
                 [
                     (
-                        f"{half.name}, {half.unit}",
+                        f"{half.name} ({half.unit})",
                         f"{half.first:.4g}",
                         f"{half.second:.4g}",
                         f"{half.apart:.2f}",
@@ -77,11 +79,13 @@ def fit_report(found: Identified, assumed: TableConfig, source: str, warning: st
                 ],
             ),
             heading("The fit"),
-            figure_block(
+            figure(
                 svg_of(_fit_figure(found)),
+                "Recorded and predicted angle of the table over time; below it what the model leaves unexplained.",
                 "Recorded and predicted angles, and the distance of the predicted angles from the readings' intervals.",
             ),
         ],
+        origin,
     )
 
 
@@ -90,20 +94,21 @@ def _believed(found: Identified) -> str:
     rms_deg, count_deg = unexplained_rms_deg(found), 360.0 / found.config.counts_per_turn
     most = max(halves_of(found), key=lambda half: half.apart / half.allowed)
     return (
-        f"The model explains the recording: beyond rounding {rms_deg / count_deg:.2g} counts rms ({rms_deg:.2g} deg) "
-        f"are left, of {MOST_UNEXPLAINED_DEG / count_deg:.2g} allowed. Both halves give the same constants: "
+        f"The model explains the recording: beyond rounding {rms_deg / count_deg:.2g} counts rms are left, of "
+        f"{MOST_UNEXPLAINED_DEG / count_deg:.2g} allowed. Both halves give the same constants: "
         f"the largest difference is {most.apart:.1f} standard deviations ({most.name}), of {most.allowed:g} allowed."
     )
 
 
+@styled()
 def _fit_figure(found: Identified) -> Figure:
-    figure = new_figure(10.5, 5.2, rows=2)
-    top, bottom = figure.axes
+    drawing = new_figure(5.2)
+    top, bottom = drawing.subplots(2, 1, sharex=True)
     time_s, seen_deg, predicted_deg = found.time_s, found.seen_deg, found.predicted_deg
     after_gap = np.diff(time_s, prepend=time_s[0]) > _GAP_S
     seen_deg, predicted_deg = (np.where(after_gap, np.nan, angle_deg) for angle_deg in (seen_deg, predicted_deg))
-    top.plot(time_s, seen_deg, color=ORANGE, linewidth=2.4, label="recorded")
-    top.plot(time_s, predicted_deg, color=BLUE, linewidth=1.0, label="predicted")
+    top.plot(time_s, seen_deg, **PLANNED, label="recorded")
+    top.plot(time_s, predicted_deg, **EXECUTED, label="predicted")
     top.set_title("Table angle")
     top.set_ylabel("angle (deg)")
     top.legend(loc="upper right")
@@ -113,6 +118,6 @@ def _fit_figure(found: Identified) -> Figure:
     bottom.set_title(
         f"Not explained by rounding: {np.count_nonzero(left)} of {len(left)} readings, rms {rms:.2g} counts"
     )
-    bottom.set_ylabel("encoder counts")
+    bottom.set_ylabel("residual (counts)")
     bottom.set_xlabel("time (s)")
-    return figure
+    return drawing

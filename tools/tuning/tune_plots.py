@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from emulator.firmware.pid import Gains
-from tools.html_report import BLUE, GREEN, GREY, ORANGE, RED, new_figure, report_style, svg_of
+from planner.plot_style import AMBER, BLUE, GREEN, LIMIT, VERMILION, new_figure, styled, svg_of
 from tools.tuning.check import Check
 from tools.tuning.frequency_response import Complex
 from tools.tuning.linear_model import Teeth, duty_gains
@@ -23,28 +23,26 @@ _TITLES = {
     Teeth.OVERHAULING: "table drives motor",
     Teeth.FREE: "free in the backlash",
 }
-_LINES: dict[Teeth, Any] = {  # told apart without colour too, and where one lies upon the other
+_LINES: dict[Teeth, Any] = {  # told apart without color too, and where one lies upon the other
     Teeth.DRIVING: {"color": BLUE, "linewidth": 2.4},
     Teeth.OVERHAULING: {"color": GREEN, "linestyle": "--"},
-    Teeth.FREE: {"color": ORANGE, "linestyle": ":", "linewidth": 2.0},
+    Teeth.FREE: {"color": AMBER, "linestyle": ":", "linewidth": 2.0},
 }
-
-
-# Told apart without colour too, and apart for color-blind readers (Okabe and Ito).
-_AFTER: Any = {"color": "#0072b2", "linewidth": 1.6}
-_BEFORE: Any = {"color": "#d55e00", "linewidth": 1.1, "linestyle": (0, (5, 2))}
+_AFTER: Any = {"color": BLUE, "linewidth": 1.6}
+_BEFORE: Any = {"color": VERMILION, "linewidth": 1.1, "linestyle": (0, (5, 2))}
 _MODEL: Any = {"color": "black", "linewidth": 1.3, "linestyle": (0, (1, 1.6))}
 
 
+@styled()
 def plots(tuning: Tuning) -> dict[str, str]:
     """Return the report's figures as SVG, by name."""
     drawings = {"answers": _answers, "bode": _bode, "nyquist": _nyquist, "spread": _spread_figure}
-    with report_style():
-        return {name: svg_of(draw(tuning)) for name, draw in drawings.items()}
+    return {name: svg_of(draw(tuning)) for name, draw in drawings.items()}
 
 
 def _answers(tuning: Tuning) -> Drawing:
-    drawing = new_figure(10.5, 11.2, rows=(len(tuning.checks) + 1) // 2, columns=2)
+    drawing = new_figure(11.2)
+    drawing.subplots((len(tuning.checks) + 1) // 2, 2)
     for axes, (before, after) in zip(drawing.axes, tuning.checks, strict=False):
         _draw_check(axes, before, after, tuning.words)
     for axes in drawing.axes[len(tuning.checks) :]:
@@ -77,7 +75,8 @@ def _loops(tuning: Tuning, gains: Gains) -> tuple[Loops, dict[Teeth, Complex]]:
 
 
 def _bode(tuning: Tuning) -> Drawing:
-    drawing = new_figure(10.5, 5.4, rows=2, columns=2)
+    drawing = new_figure(5.4)
+    drawing.subplots(2, 2)
     control = tuning.before.control
     for column, tuned in enumerate(tuning.sets.values()):
         loops, responses = _loops(tuning, tuned.design.gains)
@@ -86,8 +85,8 @@ def _bode(tuning: Tuning) -> Drawing:
         for teeth, response in responses.items():
             size.semilogx(loops.frequency_hz, 20.0 * np.log10(np.abs(response)), **_LINES[teeth], label=_TITLES[teeth])
             phase.semilogx(loops.frequency_hz[seen], np.degrees(np.unwrap(np.angle(response[seen]))), **_LINES[teeth])
-        size.axhline(0.0, color=GREY, linewidth=0.8)
-        phase.axhline(-180.0, color=GREY, linewidth=0.8)
+        size.axhline(0.0, **LIMIT)
+        phase.axhline(-180.0, **LIMIT)
         size.set(title=tuned.title, ylabel="gain (dB)", ylim=(-40, 40))
         phase.set(ylabel="phase (deg)", xlabel="frequency (Hz)", ylim=(-360, 0), xlim=size.get_xlim())
         size.legend(loc="lower left")
@@ -95,7 +94,8 @@ def _bode(tuning: Tuning) -> Drawing:
 
 
 def _nyquist(tuning: Tuning) -> Drawing:
-    drawing = new_figure(10.5, 5.2, columns=2)
+    drawing = new_figure(5.2)
+    drawing.subplots(1, 2)
     turn = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 200))
     for axes, tuned in zip(drawing.axes, tuning.sets.values(), strict=True):
         _, responses = _loops(tuning, tuned.design.gains)
@@ -103,9 +103,9 @@ def _nyquist(tuning: Tuning) -> Drawing:
             axes.plot(response.real, response.imag, **_LINES[teeth], label=_TITLES[teeth])
         limit = next(bound.limit for bound in tuned.design.bounds if bound.figure == "sensitivity_peak")
         circle = -1.0 + turn / limit
-        axes.fill(circle.real, circle.imag, color=RED, alpha=0.12, linewidth=0)
-        axes.plot(circle.real, circle.imag, color=RED, linewidth=1.0, label=f"Ms = {limit:g}")
-        axes.plot(-1.0, 0.0, "+", color=RED)
+        axes.fill(circle.real, circle.imag, color=VERMILION, alpha=0.12, linewidth=0)
+        axes.plot(circle.real, circle.imag, color=VERMILION, linewidth=1.0, label=f"Ms = {limit:g}")
+        axes.plot(-1.0, 0.0, "+", color=VERMILION)
         axes.set(
             title=tuned.title, xlim=(-2.0, 1.0), ylim=(-2.0, 1.0), aspect="equal", xlabel="real", ylabel="imaginary"
         )
@@ -114,11 +114,12 @@ def _nyquist(tuning: Tuning) -> Drawing:
 
 
 def _spread_figure(tuning: Tuning) -> Drawing:
-    drawing = new_figure(10.5, 2.7, columns=2)
+    drawing = new_figure(2.7)
+    drawing.subplots(1, 2)
     for axes, tuned in zip(drawing.axes, tuning.sets.values(), strict=True):
         axes.hist(tuned.spread.figures.sensitivity_peak, bins=40, color=BLUE, alpha=0.85)
         axes.axvline(
-            next(bound.limit for bound in tuned.design.bounds if bound.figure == "sensitivity_peak"), color=RED
+            next(bound.limit for bound in tuned.design.bounds if bound.figure == "sensitivity_peak"), color=VERMILION
         )
         axes.set(title=tuned.title, xlabel="Ms", ylabel="tables")
     return drawing

@@ -3,7 +3,8 @@
 import numpy as np
 
 from emulator.firmware.pid import Gains
-from tools.html_report import figure_block, heading, page, paragraph, table_block
+from protocol.page import Cell, Kind, Marked, Origin, details, figure, heading, page, paragraph, table
+from protocol.page import verdict as headline
 from tools.tuning.bounds import Bound
 from tools.tuning.check import Figure
 from tools.tuning.checks import differs
@@ -18,31 +19,40 @@ _SAME_SHARE = 0.05
 """Answers on the emulator that differ by less are as good as each other: so much depends on where the counts lie."""
 
 
-def tune_report(tuning: Tuning, drawings: dict[str, str]) -> str:
+def tune_report(tuning: Tuning, drawings: dict[str, str], origin: Origin | None = None) -> str:
     """Return the report as HTML, with the figures of `tune_plots.plots` in it."""
     return page(
         "Gain tuning",
         [
-            paragraph(_summary(tuning), "lead"),
+            headline(_summary(tuning), tuning.feasible),
             *_gains_section(tuning),
             *_linear_section(tuning),
-            *_comparison_section(tuning),
             *_emulator_section(tuning, drawings),
-            *_frequency_section(drawings),
-            *_spread_section(tuning, drawings),
-            heading("What the model takes as noise"),
-            paragraph(_noise(tuning)),
+            heading("In detail"),
+            details("Frequency response", _frequency_section(drawings)),
+            details("Spread of the plant", _spread_section(tuning, drawings)),
+            details("What the bound on the noise costs", _trade_section(tuning)),
+            details("Textbook rules", _textbook_section(tuning)),
+            details("What the model takes as noise", paragraph(_noise(tuning))),
         ],
+        origin,
     )
 
 
 def _summary(tuning: Tuning) -> str:
     figures = [pair for before, after in tuning.checks for pair in zip(before.figures, after.figures, strict=True)]
     better = sum(not _is_worse(old, new) for old, new in figures)
+    old, new = max(figures, key=lambda pair: pair[1].emulator / pair[0].emulator if pair[0].emulator > 0.0 else 0.0)
+    worst = f" The worst is {new.title}: {_change(old.emulator, new.emulator)}." if _is_worse(old, new) else ""
     return (
         f"{verdict(tuning)} On the emulator {better} of {len(figures)} figures are as good as with the "
-        f"{tuning.words.before} gains, within {100 * _SAME_SHARE:.0f} %, or better."
+        f"{tuning.words.before} gains, within {100 * _SAME_SHARE:.0f} %, or better.{worst}"
     )
+
+
+def _change(old: float, new: float) -> str:
+    """Return by how much a figure changed, in percent of what it was."""
+    return f"{100.0 * (new / old - 1.0):+.0f} %" if old > 0.0 and np.isfinite((old, new)).all() else ""
 
 
 def verdict(tuning: Tuning) -> str:
@@ -68,7 +78,7 @@ def _broken(design: Design) -> str:
 
 def _gains_section(tuning: Tuning) -> list[str]:
     text = "u = K (e + integral(e) / Ti - Td d(speed)/dt), in the registers of the firmware; these are judged below."
-    return [heading("Gains"), _gains_table(tuning), paragraph(text, "quiet")]
+    return [heading("Gains"), _gains_table(tuning), paragraph(text)]
 
 
 def _linear_section(tuning: Tuning) -> list[str]:
@@ -87,65 +97,64 @@ def _linear_section(tuning: Tuning) -> list[str]:
     return blocks
 
 
-def _comparison_section(tuning: Tuning) -> list[str]:
-    return [
-        heading("What the bound on the noise costs"),
-        paragraph(
-            "The best gains for other bounds on the noise, all other bounds as they are: lag of the ramp set, load "
-            "peak of the constant-speed set, and the ripple of the table's speed at creep on the emulator."
-        ),
-        trade_table(tuning.trades, tuning.limits),
-        heading("Beside textbook rules"),
-        paragraph(
-            "Both tuned sets and the rules SIMC and AMIGO, for a process of first order with a delay, on the same "
-            "figures. What breaks a bound of its set is marked; a rule is judged as a constant-speed set."
-        ),
-        textbook_table({tuned.title: tuned.design for tuned in tuning.sets.values()} | tuning.textbook, tuning.before),
-    ]
+def _trade_section(tuning: Tuning) -> str:
+    text = (
+        "The best gains for other bounds on the noise, all other bounds as they are: lag of the ramp set, load "
+        "peak of the constant-speed set, and the ripple of the table's speed at creep on the emulator."
+    )
+    return paragraph(text) + trade_table(tuning.trades, tuning.limits)
+
+
+def _textbook_section(tuning: Tuning) -> str:
+    text = (
+        "Both tuned sets and the rules SIMC and AMIGO, for a process of first order with a delay, on the same "
+        "figures. What breaks a bound of its set is marked; a rule is judged as a constant-speed set."
+    )
+    designs = {tuned.title: tuned.design for tuned in tuning.sets.values()} | tuning.textbook
+    return paragraph(text) + textbook_table(designs, tuning.before)
 
 
 def _emulator_section(tuning: Tuning, drawings: dict[str, str]) -> list[str]:
     return [
         heading("On the emulator"),
         paragraph(
-            "The full table, with friction, stiction, backlash and quantisation, beside what the linear model "
-            "foretells. Steps are the mean of runs from many places between two counts."
+            "The full table, with friction, stiction, backlash and quantization, and what the linear model "
+            "predicts. Steps are the mean of runs from many places between two counts."
         ),
         _checks_table(tuning),
         *[paragraph(text) for text in _differences(tuning)],
-        figure_block(
+        figure(
             drawings["answers"],
+            "Responses in time of the emulator with both gain sets, and of the linear model.",
             f"Answers in time: {tuning.words.after} gains (solid) and {tuning.words.before} gains (dashed) on the "
             f"emulator, and the linear model with the {tuning.words.after} gains (dotted) where its loop is stable.",
         ),
     ]
 
 
-def _frequency_section(drawings: dict[str, str]) -> list[str]:
-    return [
-        heading("Frequency response"),
-        figure_block(
-            drawings["bode"],
-            "Bode plots of the loop, in each state of the backlash; the phase up to where the speed's window hides "
-            "an oscillation.",
-        ),
-        figure_block(drawings["nyquist"], "Nyquist plots; the circle is what the bound on Ms keeps free about -1."),
-    ]
+def _frequency_section(drawings: dict[str, str]) -> str:
+    return figure(
+        drawings["bode"],
+        "Gain and phase of the loop over frequency, for both gain sets.",
+        "Bode plots of the loop, in each state of the backlash; the phase up to where the speed's window hides "
+        "an oscillation.",
+    ) + figure(
+        drawings["nyquist"],
+        "The loop in the complex plane, for both gain sets.",
+        "Nyquist plots; the circle is what the bound on Ms keeps free about -1.",
+    )
 
 
-def _spread_section(tuning: Tuning, drawings: dict[str, str]) -> list[str]:
-    return [
-        heading("Spread of the plant"),
-        paragraph(
-            f"{tuning.plants} tables whose constants lie uniformly within "
-            f"{100 * tuning.spread:.0f} % about the configured ones."
-        ),
-        _spread_table(tuning),
-        figure_block(
-            drawings["spread"],
-            "The worst Ms of each table, over the states of the backlash; the line is the bound for the nominal table.",
-        ),
-    ]
+def _spread_section(tuning: Tuning, drawings: dict[str, str]) -> str:
+    text = (
+        f"{tuning.plants:,} tables whose constants lie uniformly within "
+        f"{100 * tuning.spread:.0f} % about the configured ones."
+    )
+    caption = (
+        "The worst Ms of each table, over the states of the backlash; the line is the bound for the nominal table."
+    )
+    histogram = figure(drawings["spread"], "Histogram of Ms over the tables, for both gain sets.", caption)
+    return paragraph(text) + _spread_table(tuning) + histogram
 
 
 def _gains_table(tuning: Tuning) -> str:
@@ -153,8 +162,8 @@ def _gains_table(tuning: Tuning) -> str:
     for tuned in tuning.sets.values():
         for when, gains in zip(tuning.words, (tuned.before, tuned.design.gains), strict=True):
             rows.append((f"{tuned.title}, {when}", *_gain_cells(tuning, gains)))
-    head = ("", "K, duty s/deg", "Ti, ms", "Td, ms", "proportional", "integral", "derivative")
-    return table_block(head, rows)
+    head = ("", "K (duty s/deg)", "Ti (ms)", "Td (ms)", "proportional", "integral", "derivative")
+    return table(head, rows)
 
 
 def _gain_cells(tuning: Tuning, gains: Gains) -> tuple[str, ...]:
@@ -165,17 +174,18 @@ def _gain_cells(tuning: Tuning, gains: Gains) -> tuple[str, ...]:
 
 
 def _figures_table(tuned: TunedSet, words: Words) -> str:
-    rows: list[tuple[str, ...]] = []
+    rows: list[tuple[Cell, ...]] = []
     for bound in tuned.design.bounds:
         binding = bound in tuned.design.binding and bound not in tuned.design.broken
-        after = _judged(bound, tuned.design.figures) + (" (binding)" if binding else "")
-        rows.append((bound.title, _limit(bound), _judged(bound, tuned.before_figures), after))
+        limit = f"{'<=' if bound.at_most else '>='} {bound.shown(bound.limit)}{' (binding)' if binding else ''}"
+        judged = (_judged(bound, figures) for figures in (tuned.before_figures, tuned.design.figures))
+        rows.append((bound.title, limit, *judged, _field_change(tuned, bound.figure)))
     bounded = {bound.figure for bound in tuned.design.bounds}
     for title, field, scale, unit in (
         ("noise at the PWM on a ramp", "ramp_noise_duty", 100.0, " % duty"),
         ("overshoot after a step", "overshoot", 100.0, " %"),
         ("settling after a step", "settling_s", 1e3, " ms"),
-        ("lag on a ramp, measured speed error over acceleration", "ramp_lag_s", 1e3, " ms"),
+        ("lag on a ramp", "ramp_lag_s", 1e3, " ms"),
         ("peak after a load step", "load_peak_deg_s_Nm", 1.0, " deg/s per Nm"),
     ):
         if field in bounded:
@@ -184,19 +194,22 @@ def _figures_table(tuned: TunedSet, words: Words) -> str:
             f"{float(getattr(figures, field)[0]) * scale:.3g}{unit}" if figures.stable[0] else ""
             for figures in (tuned.before_figures, tuned.design.figures)
         ]
-        rows.append((title, "", *values))
-    return table_block((tuned.title, "bound", *words), rows)
+        rows.append((title, "", *values, _field_change(tuned, field)))
+    return table((tuned.title, "bound", *words, "change"), rows)
 
 
-def _limit(bound: Bound) -> str:
-    return f"{'<=' if bound.at_most else '>='} {bound.shown(bound.limit)}"
+def _field_change(tuned: TunedSet, field: str) -> str:
+    old, new = tuned.before_figures, tuned.design.figures
+    if not (old.stable[0] and new.stable[0]):
+        return ""
+    return _change(float(getattr(old, field)[0]), float(getattr(new, field)[0]))
 
 
-def _judged(bound: Bound, figures: LoopFigures) -> str:
+def _judged(bound: Bound, figures: LoopFigures) -> Cell:
     if not figures.stable[0]:
-        return "!not stable"
+        return Marked("not stable", "bad")
     value = bound.shown(float(getattr(figures, bound.figure)[0]))
-    return value if bound.excess(figures)[0] <= 0.0 else f"!{value}"
+    return value if bound.excess(figures)[0] <= 0.0 else Marked(value, "bad")
 
 
 def _names(bounds: tuple[Bound, ...]) -> str:
@@ -204,47 +217,42 @@ def _names(bounds: tuple[Bound, ...]) -> str:
 
 
 def _checks_table(tuning: Tuning) -> str:
-    rows: list[tuple[str, ...]] = []
+    rows: list[tuple[Cell, ...]] = []
     for before, after in tuning.checks:
         for old, new in zip(before.figures, after.figures, strict=True):
-            mark = "+" if _is_worse(new, old) else "!" if _is_worse(old, new) else ""
+            text = _change(old.emulator, new.emulator)
+            kind: Kind | None = "good" if _is_worse(new, old) else "bad" if _is_worse(old, new) else None
+            change = text if kind is None else Marked(text, kind)
             model = "" if new.model is None else f"{new.model:.3g}"
-            rows.append(
-                (
-                    f"{new.title}, {new.unit}",
-                    f"{old.emulator:.3g}",
-                    f"{mark}{new.emulator:.3g}",
-                    model,
-                    _difference(new),
-                )
-            )
-    return table_block(("figure", *tuning.words, "model", "emulator to model"), rows)
+            values = (f"{each.emulator:.3g}" for each in (old, new))
+            rows.append((f"{new.title} ({new.unit})", *values, change, model, _difference(new)))
+    return table(("figure", *tuning.words, "change", "model", "emulator to model"), rows)
 
 
 def _is_worse(old: Figure, new: Figure) -> bool:
     return new.emulator > (1.0 + _SAME_SHARE) * old.emulator
 
 
-def _difference(figure: Figure) -> str:
+def _difference(figure: Figure) -> Cell:
     if figure.model is None or figure.model == 0.0:
         return ""
     share = figure.emulator / figure.model - 1.0
     percent = f"{abs(100 * share):.0f} %"
     more_or_less = percent if percent == "0 %" else f"{percent} {'more' if share > 0.0 else 'less'}"
-    return f"{'!' if differs(figure) else ''}{more_or_less}"
+    return Marked(more_or_less, "bad") if differs(figure) else more_or_less
 
 
 def _differences(tuning: Tuning) -> list[str]:
     """Explain each figure in which emulator and model differ by more than a fifth."""
     quantum = speed_quantum_deg_s(tuning.before)
     texts = []
-    for figure, without in tuning.differences:
+    for differing, without in tuning.differences:
         others = ", ".join(f"{value:.3g} without {effect}" for effect, value in without.items())
         texts.append(
-            f"{figure.title}: {figure.emulator:.3g} {figure.unit} where the model foretells {figure.model:.3g}. On the "
-            f"emulator it would be {others}. What then still differs is the rounding, of the speed to quanta of "
-            f"{quantum:.3g} deg/s and of the PWM, the dry friction of a table that comes to a stand or turns back, and "
-            "a duty that is at its limit."
+            f"{differing.title}: {differing.emulator:.3g} {differing.unit}; the model predicts {differing.model:.3g}."
+            f" On the emulator it would be {others}. What then still differs is the rounding, of the speed to quanta"
+            f" of {quantum:.3g} deg/s and of the PWM, the dry friction of a table that comes to a stand or turns back, "
+            "and a duty that is at its limit."
         )
     return texts
 
@@ -261,7 +269,7 @@ def _spread_table(tuning: Tuning) -> str:
     for percent in (50, 95, 100):
         values = [np.percentile(outcome.figures.sensitivity_peak, percent) for outcome in (ramp, hold)]
         rows.append((f"Ms of {percent} % of the tables is at most", *(f"{value:.2f}" for value in values)))
-    return table_block(("share of the tables that meet", "ramp set", "constant-speed set"), rows)
+    return table(("share of the tables that meet", "ramp set", "constant-speed set"), rows)
 
 
 def _noise(tuning: Tuning) -> str:

@@ -87,7 +87,7 @@ def _write(
     writers = (
         partial(write_record, options.out / "record.json", header, outcomes),
         partial(write_junit, junit, header, outcomes, durations_s),
-        partial(write_report, report, header, outcomes, partial(_repeat, options)),
+        partial(write_report, report, header, outcomes, partial(_repeat, options), options.command_line),
     )
     done = [_is_done(write) for write in writers]
     if all(done):

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from math import inf
 
 
 class Verdict(StrEnum):
@@ -48,15 +49,31 @@ class Measurement:
     @property
     def verdict(self) -> Verdict:
         """Pass, or marginal near an end of the range, or fail outside of it."""
-        low = float("-inf") if self.least is None else self.least
-        high = float("inf") if self.most is None else self.most
+        low, high, width = self._range
         if not low - _ROUNDING <= self.value <= high + _ROUNDING:
             return Verdict.FAIL
-        width = high - low
-        if width == float("inf"):  # one end is open: the margin is a share of the other
-            width = abs(low if self.most is None else high)
         near = self.value - low < MARGIN * width or high - self.value < MARGIN * width
         return Verdict.MARGINAL if near and width > 0 else Verdict.PASS
+
+    @property
+    def margin(self) -> float:
+        """Distance from the nearer end of the range, as a share of its width; negative outside of it.
+
+        A range without a width has no margin: infinity with the value in it, minus infinity without.
+        """
+        low, high, width = self._range
+        distance = min(self.value - low, high - self.value)
+        if width > 0:
+            return distance / width
+        return inf if distance >= -_ROUNDING else -inf
+
+    @property
+    def _range(self) -> tuple[float, float, float]:
+        """Both ends, and the width; with one end open the width is the size of the other."""
+        low = -inf if self.least is None else self.least
+        high = inf if self.most is None else self.most
+        width = high - low
+        return low, high, width if width < inf else abs(low if self.most is None else high)
 
     def __str__(self) -> str:
         if self.least is None:

@@ -1,12 +1,12 @@
-"""The report: one HTML file that needs nothing else, for an engineer to read and to send on."""
+"""The report: one HTML page for an engineer to read and to send on."""
 
 import re
 from collections.abc import Callable, Sequence
 from html import escape
 from importlib.resources import files
 from itertools import groupby
+from math import inf
 from pathlib import Path
-from string import Template
 
 from protocol.conformance.bench.wire import Event
 from protocol.conformance.cases.case import Case
@@ -16,6 +16,7 @@ from protocol.conformance.judgement.verdict import Measurement, Verdict
 from protocol.conformance.results.record import Header, count_verdicts, versions, write_whole
 from protocol.conformance.results.svg_plot import Panel, plot, range_bar
 from protocol.conformance.session.suite import Outcome
+from protocol.page import Origin, counted, page, paragraph, verdict
 
 _CHAPTERS = {
     "2": "The serial line",
@@ -37,33 +38,47 @@ Repeat = Callable[[Case], str]
 """Returns the command that repeats a case alone."""
 
 
-def write_report(path: Path, header: Header, outcomes: Sequence[Outcome], repeat: Repeat) -> None:
-    """Write the report; it appears under its name when it is whole."""
+def write_report(path: Path, header: Header, outcomes: Sequence[Outcome], repeat: Repeat, command: str = "") -> None:
+    """Write the report; it appears under its name when it is whole. `command` is the command line that asks for it."""
     counts = count_verdicts(outcomes)
-    sums = "".join(f'<div class="sum"><b>{count}</b>{verdict}</div>' for verdict, count in counts.items())
+    sums = "".join(f'<div class="sum"><b>{count}</b>{ended}</div>' for ended, count in counts.items())
     strip = "".join(
         f'<a class="{outcome.verdict}" href="#{outcome.case.id}" title="{outcome.case.id} {outcome.verdict}"></a>'
         for outcome in outcomes
     )
     facts = "".join(f"<dt>{escape(name)}</dt><dd>{escape(text)}</dd>" for name, text in _facts(header, outcomes))
-    page = Template(files("protocol.conformance.results").joinpath("report.html").read_text(encoding="utf-8"))
-    write_whole(
-        path,
-        page.substitute(
-            device=escape(header.device),
-            table=escape(f"{header.profile.table.name} at {header.device}"),
-            sums=sums,
-            strip=strip,
-            failed=_failed(outcomes),
-            facts=facts,
-            chapters="".join(_chapters(outcomes, repeat)),
+    blocks = (
+        verdict(_headline(outcomes), not any(outcome.verdict in _BAD for outcome in outcomes)),
+        paragraph(
+            "Each case tests the table against one clause of docs/protocol.md, quoted beside its verdict."
+            " Open a case to see how it was done, what was measured, and what was sent and received."
         ),
+        f'<div class="sums">{sums}</div>',
+        f'<div class="strip">{strip}</div>',
+        _failed(outcomes),
+        f"<dl>{facts}</dl>",
+        *_chapters(outcomes, repeat),
     )
+    style = files("protocol.conformance.results").joinpath("report.css").read_text(encoding="utf-8")
+    title = f"Conformance of {header.profile.table.name} at {header.device}"
+    write_whole(path, page(title, blocks, Origin(command, header.begun), style))
+
+
+def _headline(outcomes: Sequence[Outcome]) -> str:
+    """Return how many cases failed, and which measurement was nearest to its limit, or farthest beyond."""
+    failed = sum(outcome.verdict in _BAD for outcome in outcomes)
+    text = f"{failed} of {counted(len(outcomes), 'case')} failed."
+    bounded = [(one.margin, outcome, one) for outcome in outcomes for one in outcome.measurements if one.margin < inf]
+    if not bounded:
+        return text
+    margin, outcome, one = min(bounded, key=lambda each: each[0])
+    place = "Nearest to its limit" if margin >= 0.0 else "Farthest beyond its limit"
+    return f"{text} {place}, in {outcome.case.id}: {one}."
 
 
 def _facts(header: Header, outcomes: Sequence[Outcome]) -> list[tuple[str, str]]:
     motion, serial = header.profile.motion, header.profile.serial
-    decimals = "1 decimal" if serial.decimals == 1 else f"{serial.decimals} decimals"
+    decimals = counted(serial.decimals, "decimal")
     in_motion_s = sum(outcome.seconds for outcome in outcomes if outcome.case.travel_deg)
     all_s = sum(outcome.seconds for outcome in outcomes)
     return [
@@ -100,10 +115,10 @@ def _chapters(outcomes: Sequence[Outcome], repeat: Repeat) -> list[str]:
 
 
 def _case(outcome: Outcome, repeat: Repeat) -> str:
-    case, verdict = outcome.case, outcome.verdict
-    bad = verdict in _BAD
+    case, ended = outcome.case, outcome.verdict
+    bad = ended in _BAD
     parts = [
-        f'<details id="{case.id}"{" open" if bad else ""}><summary><span class="chip {verdict}">{verdict}</span>'
+        f'<details id="{case.id}"{" open" if bad else ""}><summary><span class="chip {ended}">{ended}</span>'
         f'<code>{case.id}</code><span class="soft">{case.clause.level}</span><span>{_marked(case.clause.text)}</span>'
         f'</summary><div class="body"><p class="soft">{_marked(case.how)}</p>'
     ]
@@ -115,7 +130,7 @@ def _case(outcome: Outcome, repeat: Repeat) -> str:
     if outcome.motion is not None:
         parts.append(_motion_plot(outcome.motion))
     if bad:
-        parts.append(f'<p class="soft">Again, alone:</p><pre class="repeat">{escape(repeat(case))}</pre>')
+        parts.append(f'<p class="soft">To repeat:</p><pre class="repeat">{escape(repeat(case))}</pre>')
     if outcome.wire:
         parts.append(_wire(outcome.wire))
     return "".join(parts) + "</div></details>"
@@ -129,7 +144,8 @@ def _measurements(measurements: Sequence[Measurement]) -> str:
         f"{'' if one.most is None else f'{one.most:.6g}'}</td></tr>"
         for one in measurements
     )
-    return f"<table><tr><th>measured</th><th></th><th></th><th>within</th><th>range</th></tr>{rows}</table>"
+    head = "<tr><th>measured</th><th></th><th></th><th>within</th><th>range</th></tr>"
+    return f'<div class="wide"><table>{head}{rows}</table></div>'
 
 
 def _motion_plot(motion: MotionRecord) -> str:
@@ -152,10 +168,12 @@ def _motion_plot(motion: MotionRecord) -> str:
             speed = (sample.position_deg - earlier.position_deg) / (sample.time_s - earlier.time_s)
             speeds.append(((sample.time_s + earlier.time_s) / 2 - begin_s, speed))
     panels = (
-        Panel("position, deg", [(time_s, position) for time_s, position, _ in expected], positions),
-        Panel("speed, deg/s", [(time_s, speed) for time_s, _, speed in expected], speeds),
+        Panel("position (deg)", [(time_s, position) for time_s, position, _ in expected], positions),
+        Panel("speed (deg/s)", [(time_s, speed) for time_s, _, speed in expected], speeds),
     )
-    return plot(panels, "time, s: line expected, dots seen")
+    return plot(
+        panels, "time (s); line: expected, dots: measured", "Position and speed over time, expected and measured."
+    )
 
 
 def _wire(events: Sequence[Event]) -> str:
@@ -176,7 +194,7 @@ def _wire(events: Sequence[Event]) -> str:
         rows.append(row)
         index += 1
     lines = "\n".join(rows)
-    summary = f"<summary>the wire, {len(events)} events</summary>"
+    summary = f"<summary>the wire, {counted(len(events), 'event')}</summary>"
     return f'<details class="inner">{summary}<pre class="wire">{lines}</pre></details>'
 
 

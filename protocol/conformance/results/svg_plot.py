@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from html import escape
 from typing import NamedTuple
 
 Points = Sequence[tuple[float, float]]
@@ -17,11 +18,11 @@ class Panel(NamedTuple):
     dots: Points
 
 
-def plot(panels: Sequence[Panel], x_label: str) -> str:
-    """Return panels one below the other, over the same x."""
+def plot(panels: Sequence[Panel], x_label: str, alt: str) -> str:
+    """Return panels one below the other, over the same x; `alt` describes them to those who cannot see them."""
     x_low, x_high = _extent([x for panel in panels for x, _ in (*panel.line, *panel.dots)])
     height = len(panels) * (_PANEL + _GAP) + _BOTTOM
-    parts = [f'<svg class="plot" viewBox="0 0 {_WIDTH} {height}" role="img">']
+    parts = [f'<svg class="plot" viewBox="0 0 {_WIDTH} {height}" role="img" aria-label="{escape(alt)}">']
     for index, panel in enumerate(panels):
         top = _GAP + index * (_PANEL + _GAP)
         parts += _panel(panel, top, x_low, x_high)
@@ -40,7 +41,7 @@ def range_bar(value: float, least: float | None, most: float | None, verdict: st
     high = most if most is not None else 2 * low if low > 0 else max(1.0, 2 * value)
     share = min(max((value - low) / (high - low) if high > low else 0.5, -0.1), 1.1)
     return (
-        '<svg class="bar" viewBox="0 0 130 12" role="img">'
+        f'<svg class="bar" viewBox="0 0 130 12" role="img" aria-label="{value:.5g} within {low:.6g} to {high:.6g}">'
         '<rect class="range" x="15" y="4" width="100" height="4" rx="2"/>'
         f'<circle class="{verdict}" cx="{15 + 100 * share:.1f}" cy="6" r="4"/></svg>'
     )

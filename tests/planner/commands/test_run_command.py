@@ -53,7 +53,7 @@ def test_a_run_is_verified_and_leaves_its_files(
     assert table_s == pytest.approx(result_in(out)["commands"][-1]["time_s"], abs=3.0)
     assert table_s == pytest.approx(times_real * wall_s, rel=0.1, abs=0.01 * times_real)
     names = {file.name for file in out.iterdir()}
-    assert names == {"run.json", "run.csv", "run.png", "plan.json", "map.npz", "robot.csv", "robot.json"}
+    assert names == {"run.json", "run.csv", "run.png", "plan.json", "map.npz", "robot.csv", "robot.json", "report.html"}
     assert result_in(out)["verified"]
     assert len(json.loads((out / "robot.json").read_text())["latched"]) == LOCATIONS
 
@@ -72,16 +72,17 @@ def test_a_tolerance_that_is_not_kept_is_a_negative_verdict(
     assert capsys.readouterr().out.startswith("deviated: ")
 
 
-def test_show_writes_one_page_with_everything_in_it(plan_file: Path, tmp_path: Path) -> None:
+def test_run_and_show_write_one_page_with_everything_in_it(plan_file: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     run(plan_file, out)
-    assert main(["show", str(out)]) == 0
     page = (out / "report.html").read_text(encoding="utf-8")
+    assert main(["show", str(out), "--out", str(tmp_path / "shown.html")]) == 0
+    shown = (tmp_path / "shown.html").read_text(encoding="utf-8")
+    assert shown.partition("<footer>")[0] == page.partition("<footer>")[0]
+    assert f"<code>python -m planner run {plan_file} " in page
     assert result_in(out)["verdict"] in page
-    assert page.count("<svg") == 3
-    assert "http://" not in page.replace("http://www.w3.org", "").replace("http://creativecommons.org", "").replace(
-        "http://purl.org", ""
-    )
+    assert page.count('<svg role="img" aria-label="') == page.count("<svg") == 3
+    assert not re.search("https?://(?!www.w3.org/)", page)
     sent = result_in(out)["commands"][3]["command"]
     assert f"<td>{sent['target_deg']:g}</td>" in page
 

@@ -1,4 +1,5 @@
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -78,10 +79,10 @@ def test_a_shipped_scan_gives_a_cloud_on_the_part_and_a_report(
     assert f"dead line  the table would run on by up to {dead_line['longest_deg']:.0f} deg" in shown.out
     assert shown.err == ""  # a pipe shows no progress
     page = (tmp_path / "new" / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 3
+    assert page.count('<svg role="img" aria-label="') == page.count("<svg") == 3
+    assert f"<code>python -m planner scan {name} " in page
     assert "<script" not in page
-    assert "http://" not in page
-    assert "https://" not in page
+    assert not re.search("https?://(?!www.w3.org/)", page)
 
 
 def test_three_decimals_without_backlash_and_with_exact_calibration_lie_within_30_micrometres(
@@ -117,13 +118,19 @@ def test_one_decimal_costs_what_the_closed_form_says(scan_file: str, tmp_path: P
     assert error["radius_mm"] == pytest.approx(50.0, rel=0.01)
 
 
-def test_the_same_seed_gives_the_same_bytes_and_text_has_the_same_points(scan_file: str, tmp_path: Path) -> None:
+def test_the_same_command_gives_the_same_bytes_and_text_has_the_same_points(
+    scan_file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name in ("a", "b"):
-        assert main(["scan", scan_file, *QUICK, "--rate", "4", "--xyz", "--out", str(tmp_path / name)]) == 0
-    for file in (tmp_path / "a").iterdir():
-        assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes()
-    points = np.loadtxt(tmp_path / "a" / "cloud.xyz")
-    assert np.abs(points - cloud(tmp_path / "a")).max() < 1e-4
+        (tmp_path / name).mkdir()
+        monkeypatch.chdir(tmp_path / name)
+        assert main(["scan", scan_file, *QUICK, "--rate", "4", "--xyz", "--out", "out"]) == 0
+    first, second = tmp_path / "a" / "out", tmp_path / "b" / "out"
+    assert {file.name for file in first.iterdir()} == {"cloud.ply", "cloud.xyz", "scan.json", "report.html"}
+    for file in first.iterdir():
+        assert file.read_bytes() == (second / file.name).read_bytes()
+    points = np.loadtxt(first / "cloud.xyz")
+    assert np.abs(points - cloud(first)).max() < 1e-4
 
 
 def test_another_mesh_takes_the_place_of_the_scans(scan_file: str, tmp_path: Path) -> None:

@@ -35,6 +35,10 @@ def line(figure: Figure, axes: int, label: str) -> "tuple[np.ndarray[tuple[int],
     return np.asarray(found.get_xdata(), dtype=np.float64), np.asarray(found.get_ydata(), dtype=np.float64)
 
 
+def widths(figure: Figure, axes: int) -> dict[str, float]:
+    return {str(each.get_label()): each.get_linewidth() for each in figure.axes[axes].lines}
+
+
 def test_the_map_shows_the_forbidden_cells_where_they_are_and_the_paths_on_their_angles() -> None:
     run = stored_run()
     configuration_map = run.run_input.problem.map
@@ -46,6 +50,7 @@ def test_the_map_shows_the_forbidden_cells_where_they_are_and_the_paths_on_their
             on_path = abs((run.run_input.plan.angles_deg[location] - angle_deg + 180.0) % 360.0 - 180.0) < 12.0
             assert on_path or is_grey == configuration_map.is_allowed(location, angle_deg)
     columns, angles_deg = line(figure, 0, "planned")
+    assert widths(figure, 0)["planned"] > 3.0 * widths(figure, 0)["executed (encoder)"]
     assert columns.tolist() == list(range(configuration_map.location_count))
     assert (angles_deg - run.run_input.plan.angles_deg) % 360.0 == pytest.approx(0.0, abs=1e-9)
 

@@ -9,11 +9,12 @@ from matplotlib.image import imread
 from planner.map import map_plots
 from planner.map.config_map import ConfigurationMap
 from planner.map.map_colours import DARKEST_GRAY, coloured
-from planner.map.map_plots import plot_map, plot_map_cylinder
+from planner.map.map_plots import map_figure, plot_map, plot_map_cylinder
 from planner.map.map_reasons import FIRST_PAIR, reason_texts
 from planner.planning.plan import make_plan
 from planner.planning.plan_plots import plan_figure
 from planner.planning.problem import Problem
+from planner.plot_style import DPI, WIDTH_IN
 from planner.reasons import Reason
 from tests.planner.drawn import Drawn
 from tools import figures
@@ -62,7 +63,7 @@ def test_the_same_map_is_the_same_picture_to_the_byte(plot: type, tmp_path: Path
         plot(a_map(), tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.png", "b.png"]
-    assert imread(tmp_path / "a.png").shape[1] == 960
+    assert imread(tmp_path / "a.png").shape[1] in (8.0 * DPI, WIDTH_IN * DPI)
 
 
 def scattered_map() -> ConfigurationMap:
@@ -71,19 +72,29 @@ def scattered_map() -> ConfigurationMap:
     return ConfigurationMap(np.where(rng.random((12, 20)) < 0.3, 0.0, rng.uniform(0.6, 1.0, (12, 20))))
 
 
-def flat_map(monkeypatch: pytest.MonkeyPatch) -> Figure:
-    kept: list[Figure] = []
-    monkeypatch.setattr(map_plots, "_save", lambda figure, _file: kept.append(figure))
-    plot_map(scattered_map(), Path("unused"))
-    return kept[0]
+def flat_map() -> Figure:
+    return map_figure(scattered_map())
 
 
-def map_of_a_plan(_: pytest.MonkeyPatch) -> Figure:
+def map_of_a_plan() -> Figure:
     problem = Problem(scattered_map())
     return plan_figure(problem, make_plan(problem, "test", np.zeros(12), np.zeros(12), np.zeros(11)), "")
 
 
-def map_of_the_paper(_: pytest.MonkeyPatch) -> Figure:
+def test_a_plan_lies_on_the_map_in_the_colors_of_its_reasons() -> None:
+    shown = a_map()
+    problem = Problem(shown)
+    figure = plan_figure(problem, make_plan(problem, "test", np.full(40, 340.0), np.zeros(40), np.zeros(39)), "")
+    drawn, axes = Drawn(figure), figure.axes[0]
+    image, legend = coloured(shown)
+    for location in range(1, 40):
+        for sample in range(1, 32):
+            assert drawn.colour(axes, location, sample * 10.0) == pytest.approx(image[sample, location], abs=0.02)
+    named = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert [text.rpartition(" (")[0] for text in named] == [entry.text for entry in legend]
+
+
+def map_of_the_paper() -> Figure:
     figure = Figure(figsize=(6.0, 4.0))
     figures._draw_map(figure.subplots(), scattered_map())  # noqa: SLF001 - the part of Fig. 6 to 9 that draws the map
     return figure
@@ -91,9 +102,9 @@ def map_of_the_paper(_: pytest.MonkeyPatch) -> Figure:
 
 @pytest.mark.parametrize("draw", [flat_map, map_of_a_plan, map_of_the_paper])
 def test_a_cell_is_drawn_at_its_location_and_angle(
-    draw: Callable[[pytest.MonkeyPatch], Figure], monkeypatch: pytest.MonkeyPatch
+    draw: Callable[[], Figure],
 ) -> None:
-    figure, shown = draw(monkeypatch), scattered_map()
+    figure, shown = draw(), scattered_map()
     drawn, axes = Drawn(figure), figure.axes[0]
     assert axes.get_xlabel() in ("scan location", "")
     assert axes.get_ylabel().startswith("table angle")

@@ -26,9 +26,11 @@ def cells(html: str, first: str) -> list[str]:
 def test_the_report_says_how_far_each_answer_is_from_the_model(tuning: Tuning) -> None:
     html = tune_report(tuning, plots(tuning))
 
-    for _, after in tuning.checks:
-        for figure in after.figures:
-            *_, model, difference = cells(html, f"{figure.title}, {figure.unit}")
+    for before, after in tuning.checks:
+        for former, figure in zip(before.figures, after.figures, strict=True):
+            *_, change, model, difference = cells(html, f"{figure.title} ({figure.unit})")
+            if former.emulator > 0.0:
+                assert change == f"{100.0 * (figure.emulator / former.emulator - 1.0):+.0f} %"
             if figure.model is None:
                 assert model == difference == ""
             else:
@@ -41,7 +43,10 @@ def test_the_report_shows_what_is_not_bounded_and_compares_with_other_bounds_and
     html = tune_report(tuning, plots(tuning))
     ramp = tuning.sets["ramp"].design.figures
 
-    assert cells(html, "overshoot after a step")[-1] == f"{100 * ramp.overshoot[0]:.3g} %"
+    former = tuning.sets["ramp"].before_figures
+    *_, overshoot, change = cells(html, "overshoot after a step")
+    assert overshoot == f"{100 * ramp.overshoot[0]:.3g} %"
+    assert change == f"{100 * (ramp.overshoot[0] / former.overshoot[0] - 1.0):+.0f} %"
     asked = cells(html, "0.62")
     assert asked[-1] == "asked"
     lags = [float(cells(html, f"{100 * trade.noise_duty:.3g}")[0]) for trade in tuning.trades if trade.feasible]

@@ -10,7 +10,7 @@ import pytest
 
 from protocol.conformance.bench.wire import Event
 from protocol.conformance.cases.catalogue import chosen_cases
-from protocol.conformance.judgement.verdict import Verdict
+from protocol.conformance.judgement.verdict import Measurement, Verdict
 from protocol.conformance.profile.profile import load_profile
 from protocol.conformance.results.record import Header, write_junit, write_record
 from protocol.conformance.results.report import write_report
@@ -61,3 +61,20 @@ def test_any_name_of_a_device_costs_no_record_and_no_report(tmp_path: Path, name
     assert (suite.attrib["failures"], len(suite)) == ("1", 1)
     assert "/dev/" in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert json.loads((tmp_path / "record.json").read_text(encoding="utf-8"))["device"] == name
+
+
+def test_the_headline_states_how_many_failed_and_the_worst_figure(tmp_path: Path) -> None:
+    near, beyond = Measurement("speed", 9.0, "deg/s", 0.0, 10.0), Measurement("angle", 3.0, "deg", None, 2.0)
+    first, second, *_ = chosen_cases(["5.2"])
+    passed = Outcome(first, Verdict.MARGINAL, "", measurements=(near,))
+    failed = Outcome(second, Verdict.FAIL, "too far", measurements=(beyond,))
+    header = Header("port", load_profile(), 0, 0, [], "2026-11-28T17:00:00+00:00")
+    for outcomes, headline in (
+        ([passed], f"0 of 1 case failed. Nearest to its limit, in {first.id}: {near}."),
+        ([passed, failed], f"1 of 2 cases failed. Farthest beyond its limit, in {second.id}: {beyond}."),
+        ([Outcome(first, Verdict.PASS, "")], "0 of 1 case failed."),
+    ):
+        write_report(tmp_path / "report.html", header, outcomes, lambda _case: "", "conform --port port")
+        report = (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert f">{headline}</p>" in report
+        assert "2026-11-28T17:00:00+00:00 &middot; <code>conform --port port</code>" in report

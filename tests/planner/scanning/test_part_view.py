@@ -1,11 +1,11 @@
-"""The pictures of a scan, read back pixel by pixel."""
+"""The view of a part, read back pixel by pixel."""
 
 import numpy as np
 import pytest
 import trimesh
 
 from planner.geometry.ray_casting import RayCaster
-from planner.scanning.scan_plots import _painted, _View  # a picture without its axes, which cannot be read back
+from planner.scanning.part_view import View, painted
 
 # A block without symmetry, with a bump on its far right upper corner.
 BLOCK: trimesh.Trimesh = trimesh.creation.box((100.0, 60.0, 40.0)).apply_translation(
@@ -16,8 +16,8 @@ MARK = np.array([1.0, 0.0, 0.0])
 
 def marked(azimuth_deg: float, elevation_deg: float, point: tuple[float, float, float]) -> "tuple[int, int] | None":
     """Return row and column of the middle of a red mark at a point of the surface; None where it is hidden."""
-    view = _View.of(BLOCK, azimuth_deg, elevation_deg)
-    image = _painted(view, RayCaster(BLOCK), np.array([point]), MARK[np.newaxis], 5)
+    view = View.of(BLOCK, azimuth_deg, elevation_deg)
+    image = painted(view, RayCaster(BLOCK), np.array([point]), MARK[np.newaxis], 5)
     red = np.argwhere((image[:, :, 0] > 0.3) & (image[:, :, 1] < 0.05))
     return tuple(np.round(red.mean(axis=0)).astype(int)) if len(red) else None
 
@@ -45,7 +45,7 @@ def test_seen_from_the_right_y_is_to_the_right() -> None:
     assert far[1] - near[1] > 100
 
 
-def test_what_is_behind_the_part_is_not_painted() -> None:
+def test_what_is_behind_the_part_is_notpainted() -> None:
     assert marked(-90.0, 10.0, (0.0, 30.0, 20.0)) is None
     assert marked(90.0, 10.0, (0.0, 30.0, 20.0)) is not None
 
@@ -54,7 +54,7 @@ def test_a_mark_lies_on_the_pixel_where_the_bare_part_has_the_same_depth() -> No
     caster = RayCaster(BLOCK)
     points, _ = trimesh.sample.sample_surface(BLOCK, 300, seed=1)
     for azimuth_deg, elevation_deg in ((-60.0, 35.0), (120.0, 35.0), (200.0, 60.0)):
-        view = _View.of(BLOCK, azimuth_deg, elevation_deg)
+        view = View.of(BLOCK, azimuth_deg, elevation_deg)
         rows, columns, depths_mm = view.pixels(np.asarray(points))
         surface_mm = view.surface(caster)[1][rows, columns]
         off_mm = depths_mm - surface_mm
