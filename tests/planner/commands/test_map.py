@@ -109,7 +109,7 @@ def test_a_mesh_that_cannot_be_used_is_one_line_and_status_2(
         (tmp_path / "part.stl").write_bytes(content)
         assert main(["map", str(file), *SMALL, "--out", str(tmp_path / "out")]) == 2
         (line,) = capsys.readouterr().err.splitlines()
-        assert line.startswith(f"{file}: {tmp_path / 'part.stl'}: ")
+        assert line.startswith(f"planner map: {file}: {tmp_path / 'part.stl'}: ")
         assert not (tmp_path / "out").exists()
 
 

@@ -136,7 +136,7 @@ def test_what_cannot_be_scanned_is_refused_in_one_sentence(
     mesh.export(tmp_path / "part.stl")
     assert new_scan(tmp_path / "part.stl", *options) is None
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"{tmp_path / 'part.stl'}: ")
+    assert line.startswith(f"planner new-scan: {tmp_path / 'part.stl'}: ")
     assert re.search(message, line)
     assert sorted(tmp_path.iterdir()) == [tmp_path / "part.stl"]
 
