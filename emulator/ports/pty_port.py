@@ -17,7 +17,7 @@ from emulator.line.framing import rates_agree, read_at_rate
 from emulator.ports.device_link import DeviceLink
 from emulator.ports.inotify import CLOSED, OPENED, WRITTEN, DeviceWatch
 from emulator.ports.outbox import Outbox
-from emulator.ports.port import Arrival
+from emulator.ports.port import Arrival, changes_nothing
 from emulator.ports.readiness import wait_for
 from emulator.ports.terminal_baud import get_baud, set_baud
 from emulator.ports.visit import Visit
@@ -106,7 +106,7 @@ class PtyPort:
             visit = self._wait_for_a_write(visit)
         self._let_go()
         is_doubtful = bool(data) and visit.is_doubtful
-        if is_doubtful and not self._said_doubtful:
+        if is_doubtful and not changes_nothing(data) and not self._said_doubtful:
             self._warn(
                 f"two programs used {self.name} one right after the other, and nobody can tell which bytes are whose: "
                 "what came in one piece of both is not carried out"

@@ -108,6 +108,18 @@ def test_bytes_of_two_clients_that_are_found_in_one_look_are_doubtful(
     assert port.receive() == Arrival(left_before=True, data=first + second, is_doubtful=True)
 
 
+@pytest.mark.parametrize(("second", "count"), [(b"\x18\rH\r", 0), (b"R 1\r", 1)])
+def test_two_clients_in_one_look_are_warned_of_only_where_a_line_is_refused(
+    port: PtyPort, opened: Open, warnings: list[str], second: bytes, count: int
+) -> None:
+    client = opened(port.name)
+    os.write(client, b"H\r")
+    os.close(client)
+    os.write(opened(port.name), second)
+    assert port.receive().is_doubtful
+    assert len([sentence for sentence in warnings if "one right after the other" in sentence]) == count
+
+
 def test_bytes_that_came_after_the_last_look_may_be_of_a_client_that_left_then(port: PtyPort, opened: Open) -> None:
     client = opened(port.name)
     os.write(client, b"H\r" * READ_BYTES + b"R 9")  # more than a look takes
