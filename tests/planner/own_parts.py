@@ -54,7 +54,7 @@ OWN_PARTS = {
     "bracket": OwnPart(bracket(), "free form"),
     "plate": OwnPart(holed_plate(), "plate"),
     "sphere": OwnPart(trimesh.creation.icosphere(subdivisions=3, radius=60.0), "sphere"),
-    "tube": OwnPart(trimesh.creation.annulus(r_min=22.0, r_max=25.0, height=160.0, sections=64), "turned part"),
+    "tube": OwnPart(trimesh.creation.annulus(r_min=22.0, r_max=25.0, height=90.0, sections=64), "turned part"),
     "off centre": OwnPart(moved(cylinder(50.0, 140.0), 4321.987, -300.0, 900.0), "turned part"),
     "in inches": OwnPart(cylinder(2.4, 6.0), "turned part", ("--unit", "inch")),
     "in metres": OwnPart(trimesh.creation.box((0.2, 0.15, 0.04)), "plate", ("--unit", "m")),
