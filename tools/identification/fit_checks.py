@@ -22,8 +22,8 @@ MOST_APART = {"gain": 1.5, "time constant": 1.5, "Coulomb friction as duty": 2.0
 """By how many standard deviations the halves may differ. The deviations include the model error, so the halves of
 steady tables differ by less than half of one in general (largest of 23 tables: 1.0, 1.0, 1.1 and 1.5)."""
 
-_AT_ODDS = log(1.25)
-"""A torque constant differs from its datasheet by a tenth; by a quarter it is another motor."""
+_AT_ODDS = log(1.07)
+"""A gear ratio that is wrong by a tenth gives a torque constant that is wrong by a tenth, with no other sign."""
 
 
 class Halves(NamedTuple):
@@ -108,5 +108,5 @@ def motor_at_odds(found: Identified, assumed: TableConfig) -> str:
     return (
         f"the motor's torque constant comes out as {1e3 * after:.3g} mNm/A (no-load speed {no_load[0]:.0f} rpm), but "
         f"{1e3 * before:.3g} mNm/A ({no_load[1]:.0f} rpm) is configured; check motor, supply, gear ratio, encoder and "
-        "gains in --config: torques and inertias are wrong if one of them is"
+        "gains in --config: the constants found are wrong if one of them is"
     )

@@ -67,7 +67,7 @@ def motor(constant_Nm_A: float) -> TableConfig:
     return replace(usual, motor=replace(usual.motor, torque_constant_Nm_A=constant_Nm_A))
 
 
-@pytest.mark.parametrize("factor", [0.5, 0.7, 1.4, 2.0])
+@pytest.mark.parametrize("factor", [0.5, 0.9, 1.1, 2.0])
 def test_a_motor_that_is_not_the_configured_one_is_named_with_its_no_load_speed(factor: float) -> None:
     odds = motor_at_odds(fit(motor(factor * 0.0234), np.zeros(len(_TIME_S))), load_config())
 
@@ -76,6 +76,6 @@ def test_a_motor_that_is_not_the_configured_one_is_named_with_its_no_load_speed(
     assert "4897 rpm" in odds
 
 
-@pytest.mark.parametrize("factor", [0.85, 1.0, 1.2])
+@pytest.mark.parametrize("factor", [0.95, 1.0, 1.05])
 def test_a_motor_within_its_datasheet_is_not(factor: float) -> None:
     assert motor_at_odds(fit(motor(factor * 0.0234), np.zeros(len(_TIME_S))), load_config()) == ""
