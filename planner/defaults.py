@@ -37,7 +37,7 @@ MILLIMETRES: Mapping[str, float] = MappingProxyType({"mm": 1.0, "cm": 10.0, "m":
 """The units of length that a mesh file may be in, in mm."""
 
 LAG_S = 0.0035
-"""How long after the reference the encoder is at the same angle: that of the emulator's speed loop."""
+"""Lag of the encoder behind the reference: the lag of the emulator's speed loop."""
 LEAD_S = 0.0
 TOLERANCE_DEG = 0.25
 """Allowed deviation of the encoder at a location."""

@@ -45,7 +45,7 @@ WANTED: Final = 0.9
 
 _COPIED = ("emulator", "planner", "protocol", "tools", "tests", "pyproject.toml", "docs", "README.md")
 _TIMEOUT_S = 300.0
-_PYTEST = ("-m", "pytest", "-q", "-x", "-m", "not realtime", "-p", "no:cacheprovider", "-p", "no:randomly")
+_PYTEST = ("-m", "pytest", "-q", "-x", "-m", "not realtime", "-p", "no:cacheprovider")
 
 
 class Score(NamedTuple):

@@ -161,7 +161,7 @@ def fault_from(kind: object, given: Mapping[str, object]) -> Fault:
     """Return the fault of a name and its numbers.
 
     Raises:
-        FaultError: there is no such fault, a number is missing, unknown or out of its range, or it has two beginnings.
+        FaultError: the fault is unknown, a number is missing, unknown or out of range, or two beginnings are given.
     """
     if not isinstance(kind, str) or kind not in KINDS:
         raise FaultError(f"{brief(kind)} is not a fault; there are {', '.join(KINDS)}")

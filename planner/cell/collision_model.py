@@ -1,6 +1,6 @@
 """What can collide with what: the bodies that move with the arm, the obstacles of the cell, the pairs that can meet.
 
-Neighbors in the chain of bodies touch by construction and are no pair. How far the bodies of a pair are apart is
+Neighbors in the chain of bodies touch by construction and are not a pair. How far the bodies of a pair are apart is
 found in `planner.cell.clearance`.
 """
 

@@ -35,7 +35,7 @@ def open_port(url: str, baud: int, timeout_s: float, time_scale: float = 1.0) ->
         url: what to open.
         baud: bits a second.
         timeout_s: for reading and writing.
-        time_scale: that of the emulator behind the port; the port's clock then runs like the emulator's.
+        time_scale: time scale of the emulator behind the port; the port's clock then runs like the emulator's.
 
     Raises:
         PortError: it cannot be opened.

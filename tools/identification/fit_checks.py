@@ -108,5 +108,5 @@ def motor_at_odds(found: Identified, assumed: TableConfig) -> str:
     return (
         f"the motor's torque constant comes out as {1e3 * after:.3g} mNm/A (no-load speed {no_load[0]:.0f} rpm), but "
         f"{1e3 * before:.3g} mNm/A ({no_load[1]:.0f} rpm) is configured; check motor, supply, gear ratio, encoder and "
-        "gains in --config: the constants found are wrong if one of them is"
+        "gains in --config: torques and inertias are wrong if one of them is, all constants if gains or encoder are"
     )
