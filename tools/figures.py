@@ -197,7 +197,7 @@ def _draw_cylinder(axes: Axes3D, configuration_map: ConfigurationMap, angles_deg
 
 
 def _draw_rays(axes: Axes, problem: Problem, plan: Plan, moment: int) -> None:
-    """Draw each ray from the state at a moment, as far as it is allowed; the chosen one in the plan's colour."""
+    """Draw each ray from the state at a moment, as far as it is allowed; the chosen one in the plan's color."""
     accelerations = ray_accelerations(OBSTACLE_RAYS.rays, problem.limits.acceleration_deg_s2)
     state = float(plan.angles_deg[moment]), float(plan.speeds_deg_s[moment])
     empty = no_cost_to_go(problem)

@@ -20,7 +20,7 @@ from planner.cell.mesh_path import CLASS_OF_PATTERN, class_of, measured, mesh_wa
 from planner.cell.patterns import PATTERNS, StripLayout
 from planner.cell.scan_path import ScanPath, at_scan_speed, load_scan_path
 from planner.cell.workpiece import CLASSES, Workpiece
-from planner.defaults import MILLIMETRES, SCANS, shipped_scans
+from planner.defaults import MILLIMETERS, SCANS, shipped_scans
 from planner.errors import PlannerError, ScanFileError, WorkpieceError
 from planner.geometry.mesh import load_mesh, radius_about_axis_mm, size_fault
 from planner.kinematics.arm import Arm, shipped_arms
@@ -205,7 +205,7 @@ def _read_workpiece(
     if "mesh" in section:
         mesh_file = folder / section.text("mesh")
         kind = section.choice("class", (*CLASSES, "other"), "other")
-        unit = section.choice("unit", tuple(MILLIMETRES)) if "unit" in section else None
+        unit = section.choice("unit", tuple(MILLIMETERS)) if "unit" in section else None
         section.finish()
         mesh = load_mesh(mesh_file, unit, say, progress)
         return (measured(mesh, kind, cell.T_TW)[0] if kind != "other" else None), mesh, mesh_file

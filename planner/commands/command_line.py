@@ -10,7 +10,7 @@ from planner.defaults import (
     DEFAULT_PLANNER,
     LAG_S,
     LEAD_S,
-    MILLIMETRES,
+    MILLIMETERS,
     PART_CLASSES,
     PATTERN_NAMES,
     PLANNER_NAMES,
@@ -137,7 +137,7 @@ def _add_scan(commands: "argparse._SubParsersAction[Parser]") -> None:
     )
     _add_scan_option(parser)
     parser.add_argument("--mesh", type=Path, metavar="FILE", help="replace the workpiece by this mesh")
-    parser.add_argument("--unit", choices=tuple(MILLIMETRES), help="unit of length in --mesh (default: mm)")
+    parser.add_argument("--unit", choices=tuple(MILLIMETERS), help="unit of length in --mesh (default: mm)")
     parser.add_argument(
         "--port", metavar="URL", default="emulator://",
         help="emulator:// for a table in simulated time (the default), or an emulator's port with --control",
@@ -182,7 +182,7 @@ def _add_new_scan(commands: "argparse._SubParsersAction[Parser]") -> None:
         epilog="example: python -m planner new-scan part.stl --out part.toml",
     )
     parser.add_argument("mesh", metavar="MESH", type=Path, help="an STL, PLY or OBJ file with a closed surface")
-    parser.add_argument("--unit", choices=tuple(MILLIMETRES), help="unit of length in the file (default: mm)")
+    parser.add_argument("--unit", choices=tuple(MILLIMETERS), help="unit of length in the file (default: mm)")
     parser.add_argument(
         "--up",
         choices=AXES,

@@ -76,8 +76,8 @@ def summary(scanned: Scanned) -> str:
         f"{scanned.scan.name}: {verdict_of(scanned)}",
         f"profiles   {run.triggers} taken, {len(run.dropped)} dropped because a latch was missing",
         f"dead line  {scanned.dead_line}",
-        f"distance   mean {mean}, sigma {sigma}, 95 % within {within}, greatest {greatest} micrometres",
-        f"{'rms, in micrometres':24} {'displacement':>12} {'across':>8} {'without':>8}",
+        f"distance   mean {mean}, sigma {sigma}, 95 % within {within}, greatest {greatest} micrometers",
+        f"{'rms, in micrometers':24} {'displacement':>12} {'across':>8} {'without':>8}",
         *(f"  {name:22} {alone:>12} {across:>8} {without:>8}".rstrip() for name, alone, across, without in shares),
     ]
     return "\n".join(lines) + "\n"

@@ -112,7 +112,7 @@ def load_plan(file: Path) -> Plan:
 
 
 def _rounded(array: FloatArray) -> list[Any]:
-    """Return nested lists without noise below a nanometre, and None where there is no number."""
+    """Return nested lists without noise below a nanometer, and None where there is no number."""
     rounded = (np.round(array, _DECIMALS) + 0.0).astype(object)
     rounded[np.isnan(array)] = None
     return list(rounded.tolist())

@@ -14,7 +14,7 @@ from planner.scanning.scan_plots import STATE_NAMES, account_figure, coverage_fi
 from planner.scanning.scan_run import COVERED_MM, Scanned
 from protocol.page import Origin, counted, figure, heading, page, paragraph, table, verdict
 
-_MICROMETRES = 1e3
+_MICROMETERS = 1e3
 
 
 def scan_report(scanned: Scanned, origin: Origin | None = None) -> str:
@@ -70,7 +70,7 @@ def verdict_of(scanned: Scanned) -> str:
 
 
 def _um(length_mm: float, decimals: int = 1) -> str:
-    return f"{_MICROMETRES * length_mm:.{decimals}f}"
+    return f"{_MICROMETERS * length_mm:.{decimals}f}"
 
 
 def _summary(scanned: Scanned) -> Iterator[tuple[str, str]]:
@@ -110,7 +110,7 @@ def _account_table(accounted: Account) -> str:
     rows += [
         ("all together", _um(accounted.total.displacement_mm, 2), _um(accounted.total.across_mm, 2), ""),
         ("root of the sum of squares", _um(accounted.sum_mm, 2), "", ""),
-        ("all switched off", f"{_MICROMETRES * accounted.none_mm:.1g}", "", ""),
+        ("all switched off", f"{_MICROMETERS * accounted.none_mm:.1g}", "", ""),
     ]
     return table(("rms", "displacement alone (µm)", "across the surface (µm)", "left without it (µm)"), rows, 3)
 
@@ -138,7 +138,7 @@ def _calibration(scanned: Scanned) -> str:
     wrong = f"{probe.wrong_starts} of {probe.starts} starts ended in a false minimum"
     radius = f"the sphere's radius fits as {probe.fitted_radius_mm:.4f} ± {probe.radius_uncertainty_mm:.4f} mm"
     rows = [
-        ("table axis", _um(axis.rms_mm), f"{len(axis.residuals_mm)} sphere centres", *_uncertainty(axis), ""),
+        ("table axis", _um(axis.rms_mm), f"{len(axis.residuals_mm)} sphere centers", *_uncertainty(axis), ""),
         ("probe on the flange", _um(probe.rms_mm), f"{len(probe.residuals_mm):,} points", *_uncertainty(probe),
          f"residual {probe.noise_ratio:.2f} times the noise; {radius}; {wrong}"),
     ]  # fmt: skip

@@ -9,7 +9,7 @@ from protocol.bench import BenchError
 from protocol.command_line import Parser, program_name
 from protocol.conformance.bench.ports import SessionError, open_port
 from protocol.conformance.cases.case import Case
-from protocol.conformance.cases.catalogue import chosen_cases
+from protocol.conformance.cases.catalog import chosen_cases
 from protocol.conformance.commands.command_line import UsageError, say, tell
 from protocol.conformance.commands.replay_run import run_replay
 from protocol.conformance.commands.suite_run import run_suite

@@ -1,4 +1,4 @@
-"""The catalogue: what is a fault, by the same names and numbers everywhere."""
+"""The catalog: what is a fault, by the same names and numbers everywhere."""
 
 import json
 import math

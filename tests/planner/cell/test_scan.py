@@ -56,7 +56,7 @@ def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
             "diameter_cm = 16",
             "workpiece.diameter_mm is missing; it must be a finite number above 0",
         ),
-        ("diameter_mm = 160", "diameter_mm = 160\ncolour = 1", "workpiece.colour is not a known key; known are class,"),
+        ("diameter_mm = 160", "diameter_mm = 160\ncolor = 1", "workpiece.color is not a known key; known are class,"),
         (
             "diameter_mm = 160",
             "diameter_mm = -160",
@@ -122,7 +122,7 @@ def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
         (
             "diameter_mm = 160",
             "diameter_mm = 0.16",
-            "longest side is 0.16 mm; allowed is 10 to 1000 mm; is it in metres?",
+            "longest side is 0.16 mm; allowed is 10 to 1000 mm; is it in meters?",
         ),
         ("diameter_mm = 160", "diameter_mm = 510", "reaches 255.0 mm from the table's axis"),
         ("[0, 0, 60, 0, 0, 0]", "[0, 0, -60, 0, 0, 0]", "reaches 60.0 mm below the table's top"),
@@ -179,7 +179,7 @@ def test_a_mesh_of_no_class_needs_a_path_file(tmp_path: Path) -> None:
 def test_a_fault_of_the_mesh_names_both_files(tmp_path: Path) -> None:
     trimesh.creation.box((0.08, 0.08, 0.08)).export(tmp_path / "part.stl")
     file = changed(tmp_path, "cylinder", "diameter_mm = 140\nheight_mm = 180", 'mesh = "part.stl"')
-    with pytest.raises(WorkpieceError, match="is it in metres") as refusal:
+    with pytest.raises(WorkpieceError, match="is it in meters") as refusal:
         load_scan(file)
     assert "scan.toml" in str(refusal.value)
     assert "part.stl" in str(refusal.value)

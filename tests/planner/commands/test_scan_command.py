@@ -85,7 +85,7 @@ def test_a_shipped_scan_gives_a_cloud_on_the_part_and_a_report(
     assert not re.search("https?://(?!www.w3.org/)", page)
 
 
-def test_three_decimals_without_backlash_and_with_exact_calibration_lie_within_30_micrometres(
+def test_three_decimals_without_backlash_and_with_exact_calibration_lie_within_30_micrometers(
     scan_file: str, tmp_path: Path
 ) -> None:
     (tmp_path / "table.toml").write_text(EXACT)
@@ -168,7 +168,7 @@ def without_a_triangle() -> trimesh.Trimesh:
     ("mesh", "message"),
     [
         (without_a_triangle(), "the mesh is open"),
-        (trimesh.creation.box((0.05, 0.05, 0.05)), "is it in metres?"),
+        (trimesh.creation.box((0.05, 0.05, 0.05)), "is it in meters?"),
         (trimesh.creation.box((600.0, 50.0, 50.0)), "must stay within the table's radius of 250 mm"),
         (trimesh.creation.box((50.0, 50.0, 50.0)), "25.0 mm below the table's top"),
     ],

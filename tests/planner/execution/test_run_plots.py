@@ -46,9 +46,9 @@ def test_the_map_shows_the_forbidden_cells_where_they_are_and_the_paths_on_their
     drawn, axes = Drawn(figure), figure.axes[0]
     for location in range(configuration_map.location_count):
         for angle_deg in (60.0, 190.0, 205.0, 235.0, 250.0, 320.0, 345.0):
-            is_grey = np.ptp(drawn.colour(axes, location, angle_deg)) < 0.02
+            is_gray = np.ptp(drawn.color(axes, location, angle_deg)) < 0.02
             on_path = abs((run.run_input.plan.angles_deg[location] - angle_deg + 180.0) % 360.0 - 180.0) < 12.0
-            assert on_path or is_grey == configuration_map.is_allowed(location, angle_deg)
+            assert on_path or is_gray == configuration_map.is_allowed(location, angle_deg)
     columns, angles_deg = line(figure, 0, "planned")
     assert widths(figure, 0)["planned"] > 3.0 * widths(figure, 0)["executed (encoder)"]
     assert columns.tolist() == list(range(configuration_map.location_count))

@@ -98,7 +98,7 @@ def test_independent_parts_add_up_by_their_squares() -> None:
     assert result.sum_mm == pytest.approx(result.total.displacement_mm, rel=0.05)
 
 
-def test_with_three_decimals_no_backlash_and_exact_calibration_the_cloud_is_within_30_micrometres() -> None:
+def test_with_three_decimals_no_backlash_and_exact_calibration_the_cloud_is_within_30_micrometers() -> None:
     result = accounted(made_up_chain(3, backlash_deg=0.0, off_mm=0.0), 3)
     assert 0.020 < result.distances.sigma < 0.030
     assert result.parts[Part.CALIBRATION].displacement_mm < 1e-9
