@@ -158,8 +158,8 @@ def _print(tuning: Tuning) -> None:
         )
     for before, after in tuning.checks:
         for old, new in zip(before.figures, after.figures, strict=True):
-            foretold = "" if new.model is None else f" (model {new.model:.3g})"
-            print(f"{new.title}: {old.emulator:.3g} -> {new.emulator:.3g} {new.unit}{foretold}")
+            predicted = "" if new.model is None else f" (model {new.model:.3g})"
+            print(f"{new.title}: {old.emulator:.3g} -> {new.emulator:.3g} {new.unit}{predicted}")
 
 
 def _bounds(design: Design) -> str:

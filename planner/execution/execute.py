@@ -19,7 +19,7 @@ from planner.table.motion import Limits
 from planner.table.velocity_profile import MotionCommand, ReferenceState, time_to_rest_s
 from planner.table.wire import Grid, Wire, command_line, exchanges_s
 from protocol import ArrivalTimeout, CommandRefused, TableClient, TableError, Verb
-from protocol.bench import InsideView
+from protocol.bench import GroundTruth
 from protocol.interrupts import signals_wait
 from protocol.progress import Progress
 
@@ -74,7 +74,7 @@ def execute(
     limits: Limits,
     wire: Wire,
     settings: Settings | None = None,
-    view: InsideView | None = None,
+    view: GroundTruth | None = None,
     progress: Progress | None = None,
 ) -> Record:
     """Run a motion on a table that stands at its start, and return what happened.

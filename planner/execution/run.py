@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.defaults import RUN_ON_DEG, TOLERANCE_DEG
+from planner.execution.clear_path import check_ends, nearest_turns, turns_to_start
 from planner.execution.execute import Settings, bring_to, execute, resting_deg
-from planner.execution.free_way import check_ends, nearest_turns, turns_to_start
 from planner.execution.robot_motion import robot_motion, turning_time_s
 from planner.execution.run_file import (
     PLAN_FILE,

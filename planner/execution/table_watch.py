@@ -11,7 +11,7 @@ from planner.execution.run_record import Observation, Record
 from planner.execution.table_motion import TableMotion
 from planner.table.wire import Wire
 from protocol import TableClient, TableError
-from protocol.bench import InsideView
+from protocol.bench import GroundTruth
 from protocol.progress import Progress
 
 # What the bytes of H, or of L, and of its answer come to.
@@ -40,7 +40,7 @@ class TableWatch:
         tolerance_deg: float,
         poll_s: float,
         look_s: float,
-        view: InsideView | None = None,
+        view: GroundTruth | None = None,
         progress: Progress | None = None,
     ) -> None:
         """Watch a motion.

@@ -1,7 +1,7 @@
-"""A scan from end to end: plan, move and latch, measure, align, write, account.
+"""A scan from end to end: plan, move and latch, measure, align, write, error budget.
 
 The workpiece is measured where it truly is, at the table's true angle, and aligned with what was latched: the
-difference is the error that the account takes apart.
+difference is the error that the error budget divides among its sources.
 """
 
 from contextlib import ExitStack
@@ -17,9 +17,9 @@ from planner.cell.cell import placement
 from planner.cell.scan import Scan
 from planner.defaults import DEFAULT_PLANNER, RUN_ON_DEG
 from planner.errors import PlannerError
+from planner.execution.clear_path import check_ends
 from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.execution.execute import Settings
-from planner.execution.free_way import check_ends
 from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_motion import TableMotion
 from planner.execution.table_port import CONTROL_TIMEOUT_S, open_port
@@ -32,7 +32,7 @@ from planner.planning.scan_planning import plan_scan
 from planner.scanning.alignment import Calibration, aligned, probe_poses
 from planner.scanning.calibration import AxisCalibration, PartSize
 from planner.scanning.coverage import Coverage
-from planner.scanning.error_account import Account, Chain, Samples, account
+from planner.scanning.error_budget import Chain, ErrorBudget, Samples, error_budget_of
 from planner.scanning.latched_run import LatchedRun, TriggerConditions, run_latched
 from planner.scanning.point_cloud import PlyWriter, XyzWriter
 from planner.scanning.probe import LaserProbe, measure
@@ -128,7 +128,7 @@ class Scanned:
     run: LatchedRun
     points: int
     coverage: Coverage
-    account: Account
+    budget: ErrorBudget
     is_interrupted: bool
 
     @property
@@ -229,10 +229,8 @@ def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: Progre
         (out / "cloud.ply").unlink()
         (out / "cloud.xyz").unlink(missing_ok=True)
         raise ScanError(f"nothing was scanned: none of {len(run.numbers)} profiles meets the workpiece")
-    accounted = account(chain, work.samples.all(), scan.mesh, 10.0**-options.decimals)
-    return Scanned(
-        scan, options, probe, planned, knowledge, run, ply.count, work.coverage, accounted, not came_to_its_end
-    )
+    budget = error_budget_of(chain, work.samples.all(), scan.mesh, 10.0**-options.decimals)
+    return Scanned(scan, options, probe, planned, knowledge, run, ply.count, work.coverage, budget, not came_to_its_end)
 
 
 class _Measuring:

@@ -13,7 +13,7 @@ from planner.__main__ import main
 from planner.arrays import FloatArray
 from planner.cell.scan import load_scan
 from planner.defaults import shipped_scans
-from planner.execution.free_way import WayError
+from planner.execution.clear_path import BlockedPathError
 from planner.map.synthetic_maps import blocks_map
 from planner.planning import scan_planning
 from planner.planning.arm_motion import ArmMotion, arm_motion
@@ -98,7 +98,7 @@ def test_three_decimals_without_backlash_and_with_exact_calibration_lie_within_3
     assert parts["backlash"]["displacement_mm"] < 0.003  # to a count of the encoder
 
 
-def test_encoder_and_backlash_of_the_account_are_those_of_the_table_at_the_port(scan_file: str, tmp_path: Path) -> None:
+def test_encoder_and_backlash_of_the_budget_are_those_of_the_table_at_the_port(scan_file: str, tmp_path: Path) -> None:
     (tmp_path / "table.toml").write_text("[encoder]\nlines = 24\n[gears]\nbacklash_arcmin = 30.0\n")
     options = ["--decimals", "3", "--exact-calibration", "--port", f"emulator://?config={tmp_path / 'table.toml'}"]
     assert main(["scan", scan_file, *QUICK, *options, "--rate", "10", "--out", str(tmp_path)]) == 0
@@ -260,5 +260,5 @@ def test_a_run_up_through_a_forbidden_region_is_refused_before_the_port_is_opene
     just_before = blocks_map(16, 360, [(0, 0, 96, 98)], edge=1)
     monkeypatch.setattr(scan_run, "open_port", lambda *_: pytest.fail("the port was opened"))
     planned = Planned(plan, np.zeros((16, 6)), Limits(), just_before)
-    with pytest.raises(WayError, match="run-up at location 0 takes the table from 9"):
+    with pytest.raises(BlockedPathError, match="run-up at location 0 takes the table from 9"):
         run_on_port(planned, ScanOptions(), lambda _: None)
