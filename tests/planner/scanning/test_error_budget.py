@@ -13,7 +13,7 @@ from planner.geometry.ray_casting import RayCaster
 from planner.geometry.transforms import rigid_inverse
 from planner.kinematics.arm import Arm
 from planner.scanning.alignment import Calibration, probe_poses
-from planner.scanning.error_budget import Chain, ErrorBudget, Source, Samples, error_budget_of, signed_distances_mm
+from planner.scanning.error_budget import Chain, ErrorBudget, Samples, Source, error_budget_of, signed_distances_mm
 from planner.scanning.latched_run import LatchedRun
 from planner.scanning.probe import LaserProbe, measure
 
