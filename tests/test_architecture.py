@@ -20,7 +20,7 @@ MAY_IMPORT = {
 }
 
 ROOMS = {
-    "planner": ["geometry", "kinematics", "table", "cell", "map", "planning", "execution", "scanning", "commands"],
+    "planner": ["geometry", "kinematics", "table", "cell", "map", "planning", "execution", "tracking", "scanning", "commands"],
     "emulator": ["plant", "firmware", "line", "faults", "config", "table", "ports", "server"],
     "protocol/conformance": [
         "profile",
