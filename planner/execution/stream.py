@@ -15,7 +15,7 @@ from planner.defaults import RUN_ON_DEG
 from planner.execution.closest_command import STANDING_DEG_S, Choice, Step, closest_command, going_on, with_target
 from planner.execution.pieces import pieces_of, spacing_s
 from planner.execution.run_on import latest_s, next_command_within_s
-from planner.execution.table_motion import Leg, TableMotion
+from planner.execution.table_motion import Leg, MotionInTime, TableMotion
 from planner.table.motion import Limits
 from planner.table.velocity_profile import MotionCommand, ReferenceState, advance
 from planner.table.wire import Grid, StreamError, Wire, exchanges_s
@@ -62,55 +62,43 @@ def stream(motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float = 
     return Streaming(motion, limits, wire, run_on_deg).commands()
 
 
-class Streaming:
-    """The streaming of one motion, whole or from any of its commands on."""
+class Encoder:
+    """The command of each piece of a motion, from where the commands before it have brought the reference."""
 
-    def __init__(self, motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float) -> None:
-        """Part the motion into the pieces that get a command each; see `stream`."""
-        self._motion, self._run_on_deg = motion, run_on_deg
-        self._grid = Grid(limits, wire)
-        self._most_rate = _AT_LIMIT * limits.acceleration_deg_s2
-        self._pieces = pieces_of(motion, limits, wire, run_on_deg)
-        self._spacing_s = spacing_s(motion, limits, wire)
-
-    def commands(self) -> tuple[TimedCommand, ...]:
-        """Return all commands."""
-        start = ReferenceState(self._grid.nearest(self._motion.start_deg), 0.0)
-        return tuple(self._chain(None, start, self._pieces))
-
-    def commands_after(self, running: TimedCommand, sent: int, next_s: float) -> Iterator[TimedCommand]:
-        """Yield the commands that follow the first `sent` ones, from where those brought the reference.
+    def __init__(self, motion: MotionInTime, limits: Limits, wire: Wire, run_on_deg: float, spacing_s: float) -> None:
+        """Encode a motion.
 
         Args:
-            running: the last command that was sent, as it took effect.
-            sent: how many commands were sent.
-            next_s: when the next command takes effect; the running one has been given a target for that.
+            motion: what the table should do.
+            limits: greatest S and A.
+            wire: how fine the numbers are.
+            run_on_deg: how far the table may run on when the line dies.
+            spacing_s: how long before the end of a piece its command has to take effect at the latest.
         """
-        return self._chain(running, running.expected, self._pieces[sent:], max(next_s, running.time_s))
+        self._motion, self._run_on_deg, self._spacing_s = motion, run_on_deg, spacing_s
+        self._grid = Grid(limits, wire)
+        self._most_rate = _AT_LIMIT * limits.acceleration_deg_s2
 
-    def _chain(
-        self, running: TimedCommand | None, start: ReferenceState, pieces: Sequence[Leg], first_s: float | None = None
-    ) -> Iterator[TimedCommand]:
-        """Yield a command for each piece, when the moment of the next is known: its target depends on that."""
-        pending: TimedCommand | None = None
-        for piece in pieces:
-            before = _standing_at(start) if running is None else running.reference_at
-            choice = self._choice(running, before, piece, first_s)
-            if pending is not None:
-                yield self._aimed(pending, choice.time_s)
-            running = pending = TimedCommand(choice.time_s, piece, choice.command, before(choice.time_s))
-            first_s = None
-        if pending is not None:
-            yield pending
+    @property
+    def start(self) -> ReferenceState:
+        """Where the reference rests before the first command."""
+        return ReferenceState(self._grid.nearest(self._motion.start_deg), 0.0)
 
-    def _choice(
+    def choice(
         self,
         running: TimedCommand | None,
         before: Callable[[float], ReferenceState],
         piece: Leg,
         first_s: float | None,
     ) -> Choice:
-        """Return the command of a piece: its own, or the closest one."""
+        """Return the command of a piece: its own, or the closest one.
+
+        Args:
+            running: the command before it, as it took effect; None at the start.
+            before: where the reference is at a time without a new command.
+            piece: what the command is for.
+            first_s: its moment, where that is given.
+        """
         if piece.command is not None:
             return Choice(piece.start_s if first_s is None else first_s, self._grid.command(piece.command))
         begin_s = piece.start_s if running is None else max(piece.start_s, running.time_s)
@@ -138,14 +126,53 @@ class Streaming:
         fastest = max(speed, abs(running.expected.speed_deg_s))
         return next_command_within_s(fastest, rate, running.leg.duration_s, self._run_on_deg)
 
-    def _aimed(self, timed: TimedCommand, next_s: float) -> TimedCommand:
+    def aimed(self, timed: TimedCommand, next_s: float) -> TimedCommand:
         """Return a command with a target that serves until the next one."""
         late_s = latest_s(timed.leg.duration_s)
         choice = Choice(timed.time_s, timed.command)
         return timed._replace(command=with_target(choice, timed.expected, next_s, late_s, self._grid))
 
 
-def _standing_at(state: ReferenceState) -> Callable[[float], ReferenceState]:
+class Streaming:
+    """The streaming of one motion, whole or from any of its commands on."""
+
+    def __init__(self, motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float) -> None:
+        """Part the motion into the pieces that get a command each; see `stream`."""
+        self._encoder = Encoder(motion, limits, wire, run_on_deg, spacing_s(motion, limits, wire))
+        self._pieces = pieces_of(motion, limits, wire, run_on_deg)
+
+    def commands(self) -> tuple[TimedCommand, ...]:
+        """Return all commands."""
+        return tuple(self._chain(None, self._encoder.start, self._pieces))
+
+    def commands_after(self, running: TimedCommand, sent: int, next_s: float) -> Iterator[TimedCommand]:
+        """Yield the commands that follow the first `sent` ones, from where those brought the reference.
+
+        Args:
+            running: the last command that was sent, as it took effect.
+            sent: how many commands were sent.
+            next_s: when the next command takes effect; the running one has been given a target for that.
+        """
+        return self._chain(running, running.expected, self._pieces[sent:], max(next_s, running.time_s))
+
+    def _chain(
+        self, running: TimedCommand | None, start: ReferenceState, pieces: Sequence[Leg], first_s: float | None = None
+    ) -> Iterator[TimedCommand]:
+        """Yield a command for each piece, when the moment of the next is known: its target depends on that."""
+        pending: TimedCommand | None = None
+        for piece in pieces:
+            before = standing_at(start) if running is None else running.reference_at
+            choice = self._encoder.choice(running, before, piece, first_s)
+            if pending is not None:
+                yield self._encoder.aimed(pending, choice.time_s)
+            running = pending = TimedCommand(choice.time_s, piece, choice.command, before(choice.time_s))
+            first_s = None
+        if pending is not None:
+            yield pending
+
+
+def standing_at(state: ReferenceState) -> Callable[[float], ReferenceState]:
+    """Return where a reference is that rests, at any time."""
     return lambda _: state
 
 

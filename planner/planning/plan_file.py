@@ -11,7 +11,7 @@ from planner.arrays import FloatArray
 from planner.cell.scan import Scan
 from planner.errors import PlannerError
 from planner.planning.arm_motion import ArmMotion
-from planner.planning.plan import Pause, Plan
+from planner.planning.plan import Pause, Plan, Wait
 from planner.planning.problem import Problem
 from planner.planning.verification import verify
 from planner.table.cost import PathCost
@@ -48,6 +48,7 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -
             "speeds_deg_s": plan.speeds_deg_s.tolist(),
             "accelerations_deg_s2": plan.accelerations_deg_s2.tolist(),
             "pauses": [pause._asdict() for pause in plan.pauses],
+            **({"waits": [wait._asdict() for wait in plan.waits]} if plan.waits else {}),
         },
         "joints_deg": _rounded(motion.robot_deg),
         "start_turns": motion.start_turns.tolist(),
@@ -101,6 +102,7 @@ def load_plan(file: Path) -> Plan:
             accelerations_deg_s2=np.array(table["accelerations_deg_s2"], dtype=np.float64),
             cost=PathCost(**cost),
             pauses=tuple(Pause(**pause) for pause in table["pauses"]),
+            waits=tuple(Wait(**wait) for wait in table.get("waits", ())),
         )
     except DataFileError as error:
         raise PlanFileError(str(error)) from error

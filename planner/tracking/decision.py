@@ -9,6 +9,7 @@ from planner.arrays import CostArray, FloatArray, IndexArray
 from planner.defaults import RAY_SHOOTING, RECEDING
 from planner.kernel import kernel
 from planner.planning.cost_to_go import CostToGo
+from planner.planning.crossing import RunArray
 from planner.planning.problem import Terms
 from planner.planning.ray_shooting import Rays, ray_accelerations, ray_cost
 from planner.planning.receding import TRIALS, OnlineStep, costs_at_rest, look_ahead, trial_cost
@@ -62,7 +63,7 @@ class Receding:
         return _receding_costs(window.terms, online, window.node_cost, window.sweep, angle_deg, speed_deg_s,
                                accelerations)  # fmt: skip
 
-    def rest_costs(self, online: OnlineStep, window: Window, angle_deg: float) -> FloatArray:
+    def rest_costs(self, online: OnlineStep, window: Window, angle_deg: float) -> FloatArray:  # noqa: ARG002 - see Method
         """Return the cost of going on from each angle."""
         return _receding_rest_costs(online, window.node_cost, window.sweep, 0)
 
@@ -90,7 +91,7 @@ class RayShooting:
         last = min(self._rays.horizon, window.last)
         return _ray_costs(window.terms, last, nothing, angle_deg, speed_deg_s, accelerations)
 
-    def rest_costs(self, online: OnlineStep, window: Window, angle_deg: float) -> FloatArray:
+    def rest_costs(self, online: OnlineStep, window: Window, angle_deg: float) -> FloatArray:  # noqa: ARG002 - see Method
         """Return the way from the present angle."""
         count = window.terms.values.shape[1]
         ways = np.abs((np.arange(count) * 360.0 / count - angle_deg + 180.0) % 360.0 - 180.0)
@@ -155,7 +156,7 @@ def _receding_costs(
     terms: Terms,
     online: OnlineStep,
     node_cost: CostArray,
-    sweep: IndexArray,
+    sweep: RunArray,
     angle_deg: float,
     speed_deg_s: float,
     accelerations: FloatArray,
@@ -168,7 +169,7 @@ def _receding_costs(
 
 
 @kernel
-def _receding_rest_costs(online: OnlineStep, node_cost: CostArray, sweep: IndexArray, column: int) -> FloatArray:
+def _receding_rest_costs(online: OnlineStep, node_cost: CostArray, sweep: RunArray, column: int) -> FloatArray:
     look_ahead(online, node_cost, sweep, column, len(sweep))
     costs: FloatArray = costs_at_rest(online, node_cost, column)
     return costs

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planner.arrays import FloatArray
+from planner.arrays import CodeArray, FloatArray
 from planner.cell.cell import Cell
 from planner.kinematics.configuration import Configuration
 from planner.kinematics.inverse_kinematics import inverse_kinematics
@@ -29,7 +29,7 @@ class FollowedArm:
         """
         solved, reasons = self._solve(T_TF, angles_deg)
         rows = np.vstack((joints[np.newaxis], solved))
-        path = joint_path(self._cell.arm, rows, np.append(Reason.REACHED, reasons), self._step_s, joints)
+        path = joint_path(self._cell.arm, rows, np.append(np.uint8(Reason.REACHED), reasons), self._step_s, joints)
         # Another turn at the start is not this arm's way.
         if path.step is not None or np.abs(path.joints[0] - joints).max() > 1e-9:
             return None
@@ -48,6 +48,6 @@ class FollowedArm:
         """Return the robot's own angles (..., 6) of joints in radians."""
         return self._cell.arm.robot_deg(joints)
 
-    def _solve(self, T_TF: FloatArray, angles_deg: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _solve(self, T_TF: FloatArray, angles_deg: FloatArray) -> tuple[FloatArray, CodeArray]:
         joints, reasons = inverse_kinematics(self._cell.arm, self._cell.table_factors(angles_deg) @ T_TF)
         return joints[:, self._configuration], reasons[:, self._configuration]

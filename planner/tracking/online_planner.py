@@ -168,7 +168,7 @@ class OnlinePlanner:
         return self.pause()
 
     def pause(self) -> Step | Blocked:
-        """Return the pause that ends at rest at the next location, and take it. The table rests and the next is known."""
+        """Return the pause that ends at rest at the next location, which is known, and take it."""
         assert self.state.is_at_rest
         start, location = self.state, self.state.location + 1
         for angle_deg in self._angles_after_pause():

@@ -1,5 +1,4 @@
-"""Motions that come to rest within the columns in view: equal braking over some steps, without touching what is
-forbidden.
+"""Motions that come to rest within the columns in view, by equal braking, and touch nothing forbidden.
 
 They are what makes tracking safe. A step is taken only if such a motion exists from its end. After one step of such a
 motion the rest of it is one again, so from every state that is ever reached the table can come to rest, whatever

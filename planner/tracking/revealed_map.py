@@ -110,7 +110,8 @@ class RevealedMap:
 
     def column(self, location: int) -> FloatArray:
         """Return the (n_angles,) values of a location that is kept."""
-        return self._values[self._begin + location - self.first]
+        column: FloatArray = self._values[self._begin + location - self.first]
+        return column
 
     def window(self, location: int) -> Window:
         """Return the known columns from a location on."""
