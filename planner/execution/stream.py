@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from planner.defaults import RUN_ON_DEG
 from planner.execution.closest_command import STANDING_DEG_S, Choice, Step, closest_command, going_on, with_target
-from planner.execution.pieces import pieces_of, spacing_s
+from planner.execution.pieces import farthest_deg, pieces_of, spacing_s
 from planner.execution.run_on import latest_s, next_command_within_s
 from planner.execution.table_motion import Leg, MotionInTime, TableMotion
 from planner.table.motion import Limits
@@ -89,7 +89,7 @@ class Encoder:
         running: TimedCommand | None,
         before: Callable[[float], ReferenceState],
         piece: Leg,
-        first_s: float | None,
+        first_s: float | None = None,
     ) -> Choice:
         """Return the command of a piece: its own, or the closest one.
 
@@ -138,7 +138,7 @@ class Streaming:
 
     def __init__(self, motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float) -> None:
         """Part the motion into the pieces that get a command each; see `stream`."""
-        self._encoder = Encoder(motion, limits, wire, run_on_deg, spacing_s(motion, limits, wire))
+        self._encoder = Encoder(motion, limits, wire, run_on_deg, spacing_s(farthest_deg(motion), limits, wire))
         self._pieces = pieces_of(motion, limits, wire, run_on_deg)
 
     def commands(self) -> tuple[TimedCommand, ...]:
