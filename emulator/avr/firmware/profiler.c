@@ -22,21 +22,37 @@ static bool can_brake(uint32_t speed, uint32_t acceleration, int64_t room)
     return (int64_t)((uint64_t)speed * (speed + acceleration)) <= room;
 }
 
-/* Return the greatest speed v between `low` and `high` with v (v + a) <= room, or `low` if there is none; `high` is too
-   fast. One bit of the result a round: twenty products cost less than one division of 64 bits. */
+/* Return the greatest speed v from `low` up to below `high` with v (v + a) <= room, or `low` if there is none; `high` is
+   too fast.
+
+   One bit of the result a round, as in a root by hand: a step s from v takes s (2v + a + s) of the room. What is left is
+   kept in units of s, so that a round works on 32 bits; a division of 64 bits would take half of the tick. */
 static uint32_t fastest_that_can_brake(uint32_t low, uint32_t high, uint32_t acceleration, int64_t room)
 {
-    uint32_t step = 1;
-    while (step <= (high - low) >> 1) {
-        step <<= 1;
+    const int64_t spare = room - (int64_t)((uint64_t)low * (low + acceleration));
+    if (spare <= 0 || high == low) {
+        return low;
     }
-    for (; step != 0; step >>= 1) {
-        const uint32_t speed = low + step;
-        if (speed < high && can_brake(speed, acceleration, room)) {
-            low = speed;
+    uint8_t bits = 0;
+    while ((high - low) >> bits > 1) {
+        ++bits;
+    }
+    uint32_t left = (uint32_t)((uint64_t)spare >> bits), next_bits = (uint32_t)spare, slope = 2 * low + acceleration;
+    bool carry = ((uint64_t)spare >> bits) >> 32 != 0;
+    next_bits = bits == 0 ? 0 : next_bits << (32 - bits);
+    for (uint32_t step = 1UL << bits;; step >>= 1) {
+        if (carry || left >= slope + step) {
+            left -= slope + step;
+            slope += 2 * step;
+            low += step;
         }
+        if (step == 1) {
+            return low;
+        }
+        carry = (left & 0x80000000UL) != 0;
+        left = left << 1 | next_bits >> 31;
+        next_bits <<= 1;
     }
-    return low;
 }
 
 /* Return the way until the next tick towards a target ahead, and change the speed to that of the next tick.
@@ -58,14 +74,14 @@ static int32_t advance(const struct profile *profile, int32_t *speed, int64_t di
         return (int32_t)distance;
     }
     if (fastest > 0 && distance < profile->far) {
-        const int64_t room = 2 * acceleration * distance - (int64_t)acceleration * now;
+        const int64_t room = acceleration * (2 * distance - now);
         if (!can_brake((uint32_t)fastest, (uint32_t)acceleration, room)) {
             const uint32_t low = slowest > 0 ? (uint32_t)slowest : 0;
             fastest = (int32_t)fastest_that_can_brake(low, (uint32_t)fastest, (uint32_t)acceleration, room);
         }
     }
     *speed = fastest;
-    return (now + fastest) >> 1;
+    return now + ((fastest - now) >> 1); /* their sum may be more than 32 bits */
 }
 
 void profiler_step(const struct profile *profile, struct reference *reference)
