@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from functools import cache
 
 from emulator.avr.elf import DATA_SPACE, Program
-from emulator.avr.toolchain import ToolchainError, build_simulator
+from emulator.avr.errors import ChipError, ToolchainError
+from emulator.avr.toolchain import build_simulator
 
 _MOST_SENT = 256
 _FAILURES = {
@@ -29,10 +30,6 @@ class _Shown(ctypes.Structure):
         ("sent_count", ctypes.c_uint32),
         ("sent", ctypes.c_uint8 * _MOST_SENT),
     )
-
-
-class ChipError(RuntimeError):
-    """The controller stopped; the message says why."""
 
 
 class Chip:
@@ -111,7 +108,7 @@ class Chip:
     @property
     def mean_tick(self) -> float:
         """The cycles of the mean tick, interrupts included."""
-        return self._shown.tick_cycles / max(1, self._shown.ticks)
+        return float(self._shown.tick_cycles) / max(1, self._shown.ticks)
 
     @property
     def lost_edges(self) -> int:

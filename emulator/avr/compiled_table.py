@@ -1,7 +1,7 @@
 """The table whose firmware is the compiled one: an ATmega328P in simavr in place of `emulator.firmware`.
 
-It has the surface of `emulator.Table`, so that all ports, the trace and the conformance kit work on it. The plant is the
-emulator's. Each of its ticks is one call into the simulator.
+It has the surface of `emulator.Table`, so that all ports, the trace and the conformance kit work on it. The plant is
+the emulator's. Each of its ticks is one call into the simulator.
 """
 
 import math
@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 from emulator.avr.chip import Chip
 from emulator.avr.elf import ElfError, Program, read_program
+from emulator.avr.errors import ToolchainError
 from emulator.avr.header import digest_of, uart_of
-from emulator.avr.toolchain import ToolchainError, build_firmware
+from emulator.avr.toolchain import build_firmware
 from emulator.config.constants import drive_constants, encoder_constants
 from emulator.config.table_config import TableConfig
 from emulator.faults.fault import FaultError
@@ -26,6 +27,7 @@ from emulator.plant.drive_train import at_standstill
 from emulator.plant.drive_train import step as drive_step
 from emulator.plant.encoder import recounted
 from emulator.table.status import table_facts
+from emulator.table.table import Table
 from emulator.table.trigger import TriggerInput
 from protocol.bench import Fault, Observer, TableStatus
 
@@ -49,7 +51,7 @@ class Controller(NamedTuple):
     fraction: int
     reference_speed: int
     distance: int
-    count: int
+    encoder_count: int
     still_ticks: int
     settling_ticks: int
     arrived_ticks: int
@@ -212,7 +214,7 @@ class CompiledTable:
         return TableStatus(
             tick=self.tick,
             reference_deg=(now.position + from_fixed(now.fraction, bits)) / count_deg,
-            encoder_deg=now.count / count_deg,
+            encoder_deg=now.encoder_count / count_deg,
             true_deg=math.degrees(drive.table_angle_rad - self._true_zero_rad),
             reference_speed_deg_s=from_fixed(now.reference_speed, bits) * speed_deg_s,
             speed_deg_s=now.measured / config.control.speed_window_ticks * speed_deg_s,
@@ -279,6 +281,10 @@ class CompiledTable:
             raise FaultError(
                 f"{faults[0].kind} has no effect on the compiled firmware; inject faults into the emulator's own"
             )
+
+
+AnyTable = Table | CompiledTable
+"""A table in simulated time, whichever firmware it has."""
 
 
 def read_firmware(config: TableConfig, file: Path | None) -> Program:

@@ -11,6 +11,7 @@ from pathlib import Path
 from shutil import which
 from tempfile import TemporaryDirectory
 
+from emulator.avr.errors import ToolchainError
 from emulator.avr.header import header_text
 from emulator.config.table_config import TableConfig
 from protocol.kept_code import cache_root
@@ -28,10 +29,6 @@ COMPILE = (
     *("-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections,--undefined=table_digest"),
 )
 _COMPILE_SHIM = ("gcc", "-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-I/usr/include/simavr")
-
-
-class ToolchainError(Exception):
-    """The firmware cannot be built or run here; the message says why and what to do."""
 
 
 def lacking() -> str:

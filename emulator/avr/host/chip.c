@@ -279,6 +279,7 @@ int chip_start(struct chip *chip, uint32_t main_address, uint16_t data_address, 
         }
     }
     memcpy(avr->data + data_address, &number, sizeof number);
+    avr->run_cycle_limit = chip->tick_period; /* run to the next cycle timer in one go */
     return run_slice(chip);
 }
 
