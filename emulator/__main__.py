@@ -11,9 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from emulator.avr.errors import ChipError, ToolchainError
-from emulator.config.table_config import TableConfig, load_config
-from emulator.config.toml_section import ConfigError
-from emulator.faults.parameter import brief
+from emulator.config.table_config import ConfigError, TableConfig, load_config
 from emulator.ports.port import Port
 from emulator.ports.tcp_port import TcpPort, parse_address
 from emulator.server.clock import TIME_SCALE, Clock
@@ -22,6 +20,7 @@ from emulator.server.signals import SignalWatch
 from emulator.table.table import Table
 from emulator.trace import TraceError, TraceWriter
 from protocol.command_line import Parser, program_name
+from protocol.data_file import shown
 
 _EXAMPLE = """example:
   python -m emulator --pty --link ./table &
@@ -125,14 +124,14 @@ def _rate(text: str) -> float:
     except ValueError:
         value = math.nan
     if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"{brief(text)} is not a number from 0 up")
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not a number from 0 up")
     return value
 
 
 def _seed(text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS):
         raise argparse.ArgumentTypeError(
-            f"{brief(text)} is not a whole number from 0 up, of at most {_MOST_DIGITS} digits"
+            f"{shown(text)} is not a whole number from 0 up, of at most {_MOST_DIGITS} digits"
         )
     return int(text)
 

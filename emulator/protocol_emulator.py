@@ -14,8 +14,7 @@ from urllib.parse import parse_qsl, urlsplit
 import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException, SerialTimeoutException
 
-from emulator.config.table_config import TableConfig, load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, TableConfig, load_config
 from emulator.line.framing import rates_agree, read_at_rate
 from emulator.table.fast_ticks import FastTicks
 from emulator.table.table import Table

@@ -84,6 +84,7 @@ PROTOCOL_EDGE = {
     "protocol/quiet_start.py": {"os", "signal"},
     "protocol/conformance/__main__.py": {"pathlib"},
     "protocol/data_file.py": {"pathlib"},
+    "protocol/toml_table.py": {"pathlib"},
     "protocol/conformance/pytest/fixture.py": {"pathlib", "subprocess"},
     "protocol/conformance/bench/host_watch.py": {"os", "select", "threading", "time"},
     "protocol/conformance/bench/ports.py": {"pathlib", "serial"},

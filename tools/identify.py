@@ -12,8 +12,7 @@ import sys
 from math import inf
 from pathlib import Path
 
-from emulator.config.table_config import load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, load_config
 from protocol.client import TableClient
 from protocol.command_line import Parser, program_name
 from protocol.errors import TableError

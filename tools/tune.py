@@ -22,8 +22,7 @@ from contextlib import ExitStack
 from math import inf
 from pathlib import Path
 
-from emulator.config.table_config import load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, load_config
 from protocol.command_line import Parser, program_name
 from protocol.page import Origin
 from protocol.progress import share_shown

@@ -27,9 +27,9 @@ from planner.kinematics.arm import Arm, shipped_arms
 from planner.kinematics.value import ValueFunction
 from planner.table.cost import Weights, costs_overflow, default_weights
 from planner.table.motion import Limits
-from planner.toml_table import TomlTable
 from protocol.data_file import did_you_mean
 from protocol.progress import Progress
+from protocol.toml_table import TomlTable
 
 DEFAULT_ARM = "viper_s650"
 # A workpiece may touch the table, and a mesh's base need not be ground flat.
@@ -81,7 +81,7 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progre
     file = shipped if shipped.is_file() else Path(scan)
     if not file.is_file():
         raise ScanFileError(f"{scan} is neither a scan file nor one of the shipped scans {', '.join(shipped_scans())}")
-    top = TomlTable.load(file)
+    top = TomlTable.load(file, ScanFileError)
     top.only("cell", "workpiece", "path", "value", "limits", "weights")
     with _named(file):
         cell, bodies = _read_cell(top.table("cell"), file.parent)

@@ -8,8 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from emulator.config.constants import firmware_constants, fixed_gains
-from emulator.config.table_config import GainsConfig, load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, GainsConfig, load_config
 from emulator.firmware.fixed_point import ERROR_BITS, OUTPUT_BITS
 from emulator.firmware.pid import HOLD, RAMP, Gains, Pid, PidState, step
 from emulator.int32 import INT32_MAX
