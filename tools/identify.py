@@ -15,11 +15,12 @@ from pathlib import Path
 from emulator.config.table_config import ConfigError, load_config
 from protocol.client import TableClient
 from protocol.command_line import Parser, program_name
+from protocol.ending import ended
 from protocol.errors import TableError
 from protocol.page import Origin
 from protocol.progress import share_shown
 from protocol.whole_file import write_whole
-from tools.command_line import check_writable, ended
+from tools.command_line import check_writable
 from tools.identification.errors import RecordingError
 from tools.identification.excitation import excitation
 from tools.identification.fit_checks import check_fit, motor_at_odds

@@ -21,9 +21,9 @@ from typing import NamedTuple
 
 from emulator.table.fast_ticks import LOADED_TICKS
 from protocol.command_line import Parser, program_name
+from protocol.ending import ended
 from protocol.own_program import own_environment, own_program
 from protocol.progress import share_shown
-from tools.command_line import ended
 from tools.mutation import COMPILED, MODULES, Mutation, mutations_of, planted
 
 EXPLAINED = Path(__file__).with_name("mutants.toml")

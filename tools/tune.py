@@ -24,10 +24,11 @@ from pathlib import Path
 
 from emulator.config.table_config import ConfigError, load_config
 from protocol.command_line import Parser, program_name
+from protocol.ending import ended
 from protocol.page import Origin
 from protocol.progress import share_shown
 from protocol.whole_file import whole_file
-from tools.command_line import check_folder, ended
+from tools.command_line import check_folder
 from tools.tuning.bounds import Limits
 from tools.tuning.figures_json import figures_json
 from tools.tuning.gain_design import Design
