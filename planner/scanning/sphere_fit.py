@@ -27,24 +27,18 @@ class SphereFit(NamedTuple):
     deviations_mm: FloatArray
 
 
-def sphere_center(points: FloatArray, radius_mm: float) -> FloatArray:
-    """Return the center `(3,)` of a sphere of known radius through points `(m, 3)`, by least squares.
+def fit_sphere(points: FloatArray, radius_mm: float, noise_mm: float = 0.0) -> SphereFit:
+    """Return the sphere of known radius through points `(m, 3)`, with its uncertainty, by least squares.
 
     Points in one plane, as of a single profile, fit two spheres, one on each side of their plane; they are refused.
-
-    Raises:
-        CalibrationError: There are fewer than 4 points, or two centers fit equally well.
-    """
-    return fit_sphere(points, radius_mm).center
-
-
-def fit_sphere(points: FloatArray, radius_mm: float, noise_mm: float = 0.0) -> SphereFit:
-    """Return the sphere of known radius through points `(m, 3)`, with its uncertainty; see `sphere_center`.
 
     Args:
         points: In mm.
         radius_mm: The sphere's radius.
         noise_mm: Standard deviation of the points' heights.
+
+    Raises:
+        CalibrationError: There are fewer than 4 points, or two centers fit equally well.
     """
     if len(points) < _FEWEST_POINTS or not np.isfinite(points).all():
         raise CalibrationError(f"a sphere's center needs at least {_FEWEST_POINTS} points, all of them finite")

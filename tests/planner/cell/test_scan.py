@@ -10,6 +10,7 @@ from planner.defaults import shipped_scans
 from planner.errors import PlannerError, ScanFileError, WorkpieceError
 from planner.kinematics.inverse_kinematics import inverse_kinematics
 from planner.reasons import Reason
+from tests.planner.goals import goal_flange_poses
 
 SCANS = Path(__file__).parents[3] / "planner" / "scans"
 
@@ -32,7 +33,7 @@ def test_a_shipped_scan_has_about_a_hundred_locations_each_reached_at_some_table
     scan = load_scan(name)
     assert scan.name == name
     assert 90 <= scan.path.count <= 110
-    goals = scan.cell.goal_flange_poses(scan.path.T_WS, np.arange(0.0, 360.0, 10.0))
+    goals = goal_flange_poses(scan.cell, scan.path.T_WS, np.arange(0.0, 360.0, 10.0))
     _, reasons = inverse_kinematics(scan.cell.arm, goals.reshape(-1, 4, 4))
     reached = (reasons == Reason.REACHED).reshape(*goals.shape[:2], 8)
     assert reached.any(axis=1).all(axis=0).any(), "no configuration reaches every location"
@@ -42,7 +43,7 @@ def test_a_shipped_scan_has_about_a_hundred_locations_each_reached_at_some_table
 @pytest.mark.parametrize("name", ["sphere", "cylinder"])
 def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
     scan = load_scan(name)
-    goals = scan.cell.goal_flange_poses(scan.path.T_WS, np.arange(0.0, 360.0, 5.0))
+    goals = goal_flange_poses(scan.cell, scan.path.T_WS, np.arange(0.0, 360.0, 5.0))
     _, reasons = inverse_kinematics(scan.cell.arm, goals.reshape(-1, 4, 4))
     reached = (reasons == Reason.REACHED).reshape(*goals.shape[:2], 8)
     assert not reached.all(axis=0).any(), "one table angle serves the whole path"

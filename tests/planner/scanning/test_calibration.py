@@ -16,7 +16,7 @@ from planner.scanning.calibration import (
 from planner.scanning.probe import LaserProbe
 from planner.scanning.probe_calibration import calibrate_probe, cube_turns
 from planner.scanning.reference_sphere import calibrate_cell, profile_of_sphere, views_of
-from planner.scanning.sphere_fit import fit_sphere, sphere_center
+from planner.scanning.sphere_fit import fit_sphere
 from tools.bench.calibration import AXIS_TRIALS, PROBE_TRIALS
 
 TRUE = Calibration.of(Cell())
@@ -208,9 +208,9 @@ def test_one_profile_has_two_centers_and_neither_is_taken() -> None:
     profile = profile_of_sphere(LaserProbe(), T_BS, CENTER, RADIUS_MM, np.random.default_rng(0))
     points = profile @ T_BS[:3, :3].T + T_BS[:3, 3]
     with pytest.raises(CalibrationError, match=r"lie in one plane; centers at \(.*\) and \(.*\) mm fit equally well"):
-        sphere_center(points, RADIUS_MM)
+        fit_sphere(points, RADIUS_MM)
     with pytest.raises(CalibrationError, match="at least 4 points"):
-        sphere_center(points[:3], RADIUS_MM)
+        fit_sphere(points[:3], RADIUS_MM)
 
 
 def test_the_deviation_of_a_center_is_that_of_repeated_measurements() -> None:
@@ -305,7 +305,7 @@ def test_a_noise_or_radius_that_cannot_be_is_refused(wrong: float) -> None:
     with pytest.raises(CalibrationError, match="must all be in mm"):
         calibrate_probe(*views, wrong, TRUE.T_FS)
     with pytest.raises(CalibrationError, match=r"radius is .* finite number above 0"):
-        sphere_center(centers(), wrong)
+        fit_sphere(centers(), wrong)
 
 
 def test_a_center_is_found_from_a_part_of_the_sphere() -> None:
@@ -313,4 +313,4 @@ def test_a_center_is_found_from_a_part_of_the_sphere() -> None:
     normals = rng.normal(size=(400, 3))
     normals[:, 2] = np.abs(normals[:, 2])
     points = CENTER + RADIUS_MM * normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    assert np.abs(sphere_center(points, RADIUS_MM) - CENTER).max() < 1e-6
+    assert np.abs(fit_sphere(points, RADIUS_MM).center - CENTER).max() < 1e-6

@@ -16,6 +16,7 @@ from planner.scanning.alignment import Calibration, probe_poses
 from planner.scanning.error_budget import Chain, ErrorBudget, Samples, Source, error_budget_of, signed_distances_mm
 from planner.scanning.latched_run import LatchedRun
 from planner.scanning.probe import LaserProbe, measure
+from tests.planner.goals import goal_flange_poses
 
 CELL = Cell()
 TRUE = Calibration.of(CELL)
@@ -42,7 +43,7 @@ def made_up_chain(
     edge_deg = true_deg + 0.001
     shaft_deg = edge_deg - backlash_deg
     latched_deg: FloatArray = np.round(shaft_deg * counts_per_deg) / counts_per_deg
-    T_BF = CELL.goal_flange_poses(poses_round_the_block(), true_deg)[np.arange(PROFILES), np.arange(PROFILES)]
+    T_BF = goal_flange_poses(CELL, poses_round_the_block(), true_deg)[np.arange(PROFILES), np.arange(PROFILES)]
     numbers = np.tile(np.arange(PROFILES, dtype=np.float64)[:, np.newaxis], (1, 6))
     times_s = np.linspace(0.0, 24.0, PROFILES)
     run = LatchedRun(
