@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from emulator.config.constants import firmware_constants
 from emulator.config.table_config import TableConfig
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError
 from emulator.firmware.fixed_point import GAIN_BITS, INTEGRAL_GAIN_BITS
 from emulator.firmware.pid import Gains
 from emulator.table.interpreter import Interpreter

@@ -20,13 +20,11 @@ from planner.errors import PlannerError
 from planner.execution.clear_path import check_ends
 from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.execution.execute import Settings
+from planner.execution.run_input import RunInput
 from planner.execution.stream import check_it_fits, stream
-from planner.execution.table_motion import TableMotion
 from planner.execution.table_port import CONTROL_TIMEOUT_S, open_port
 from planner.geometry.ray_casting import RayCaster
-from planner.map.config_map import ConfigurationMap
 from planner.planning.arm_check import PlannedArm, arm_fault
-from planner.planning.plan import Plan
 from planner.planning.planners import PLANNERS
 from planner.planning.scan_planning import plan_scan
 from planner.scanning.alignment import Calibration, aligned, probe_poses
@@ -39,7 +37,6 @@ from planner.scanning.probe import LaserProbe, measure
 from planner.scanning.probe_calibration import ProbeCalibration
 from planner.scanning.reference_sphere import calibrate_cell
 from planner.scanning.trigger_line import ProbeByHand, ProbeOnPort, TriggerLine
-from planner.table.motion import Limits
 from planner.table.wire import Wire
 from protocol import TableClient
 from protocol.bench import bench_of
@@ -77,21 +74,6 @@ class ScanOptions(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Planned:
-    """The motion of a scan: the table's plan on its map, and the arm's joints `(n + 1, 6)` in deg along it."""
-
-    plan: Plan
-    joints_deg: FloatArray
-    limits: Limits
-    map: ConfigurationMap
-
-    @property
-    def motion(self) -> TableMotion:
-        """What the table does."""
-        return TableMotion(self.plan, self.limits)
-
-
-@dataclass(frozen=True, eq=False)
 class Knowledge:
     """What the alignment knows of the cell, and from which measurements."""
 
@@ -123,7 +105,7 @@ class Scanned:
     scan: Scan
     options: ScanOptions
     probe: LaserProbe
-    planned: Planned
+    planned: RunInput
     knowledge: Knowledge
     run: LatchedRun
     points: int
@@ -134,7 +116,7 @@ class Scanned:
     @property
     def dead_line(self) -> DeadLine:
         """How far the table would have run on if the line had died, and into what."""
-        return judge_dead_line(self.planned.map, self.planned.motion, self.run.record)
+        return judge_dead_line(self.planned.problem.map, self.planned.motion(), self.run.record)
 
     @property
     def is_whole(self) -> bool:
@@ -142,23 +124,24 @@ class Scanned:
         return self.run.failure is None and not self.is_interrupted
 
 
-def planned_scan(scan: Scan, configuration: str, angle_count: int, progress: ProgressOf) -> Planned:
+def planned_scan(scan: Scan, configuration: str, angle_count: int, progress: ProgressOf) -> RunInput:
     """Return the best motion for a scan.
 
     Raises:
         ScanError: There is none that the arm can follow.
     """
     plans = plan_scan(scan, configuration, angle_count, PLANNERS[DEFAULT_PLANNER], progress, compiled=DEFAULT_PLANNER)
-    if plans.best is None:
+    planned = plans.best
+    if planned is None:
         raise ScanError(plans.comparison.why_no_plan(scan))
-    problem, plan, motion = plans.best
-    fault = arm_fault(PlannedArm(scan.cell, scan.path.T_WS, motion.robot_deg), plan)
+    joints_deg = planned.arm.robot_deg
+    fault = arm_fault(PlannedArm(scan.cell, scan.path.T_WS, joints_deg), planned.plan)
     if fault is not None:
         raise ScanError(f"{scan.name}: the arm cannot follow the plan: {fault}")
-    return Planned(plan, motion.robot_deg, scan.limits, problem.map)
+    return RunInput(scan.name, planned.plan, planned.problem, joints_deg, scan.cell.arm)
 
 
-def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) -> LatchedRun:
+def run_on_port(planned: RunInput, options: ScanOptions, progress: ProgressOf) -> LatchedRun:
     """Return what was latched while the table at the port made the motion.
 
     Raises:
@@ -167,8 +150,9 @@ def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) ->
         TableError: The table does not answer, or did not come to the start.
     """
     wire = Wire(options.decimals, options.baud)
-    check_ends(planned.map, planned.motion)
-    check_it_fits(stream(planned.motion, planned.limits, wire, options.run_on_deg), wire)
+    motion, limits = planned.motion(), planned.problem.limits
+    check_ends(planned.problem.map, motion)
+    check_it_fits(stream(motion, limits, wire, options.run_on_deg), wire)
     port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
     with TableClient(port, options.timeout_s * options.time_scale, options.decimals) as table:
         line = _trigger_line(port, table, options)
@@ -178,7 +162,7 @@ def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) ->
             line,
             planned.plan,
             planned.joints_deg,
-            planned.limits,
+            limits,
             wire,
             options.triggers,
             settings,

@@ -14,16 +14,18 @@ from planner.arrays import FloatArray
 from planner.cell.scan import load_scan
 from planner.defaults import shipped_scans
 from planner.execution.clear_path import BlockedPathError
+from planner.execution.run_input import RunInput
+from planner.kinematics.arm import Arm
 from planner.map.synthetic_maps import blocks_map
 from planner.planning import scan_planning
 from planner.planning.arm_motion import ArmMotion, arm_motion
 from planner.planning.plan import Plan
+from planner.planning.problem import Problem
 from planner.scanning import scan_run
 from planner.scanning.scan_file import scan_document
 from planner.scanning.scan_report import scan_report
-from planner.scanning.scan_run import Planned, ScanOptions, run_on_port, scan_workpiece
+from planner.scanning.scan_run import ScanOptions, run_on_port, scan_workpiece
 from planner.table.cost import PathCost
-from planner.table.motion import Limits
 
 SMALL = """
 [cell]
@@ -259,6 +261,6 @@ def test_a_run_up_through_a_forbidden_region_is_refused_before_the_port_is_opene
     plan = Plan("", "", 0.1, np.arange(100.0, 132.0, 2.0), speeds, np.zeros(15), PathCost(0.0, 0.0, 0.0))
     just_before = blocks_map(16, 360, [(0, 0, 96, 98)], edge=1)
     monkeypatch.setattr(scan_run, "open_port", lambda *_: pytest.fail("the port was opened"))
-    planned = Planned(plan, np.zeros((16, 6)), Limits(), just_before)
+    planned = RunInput("", plan, Problem(just_before, 0.1), np.zeros((16, 6)), Arm.load())
     with pytest.raises(BlockedPathError, match="run-up at location 0 takes the table from 9"):
         run_on_port(planned, ScanOptions(), lambda _: None)

@@ -8,7 +8,7 @@ from planner.execution.run_file import RunConditions, StoredRun
 from planner.execution.run_plots import deviation_figure, map_figure, motion_figure
 from planner.execution.run_record import Observation, Record
 from planner.execution.run_verification import verify_run
-from planner.execution.table_motion import PauseTimes, TableMotion
+from planner.execution.table_motion import PauseTimes
 from planner.table.wire import Wire
 from tests.planner.drawn import Drawn
 from tests.planner.run_examples import short_run_input
@@ -19,7 +19,7 @@ LEAD_S, LAG_S, OFF_DEG = 0.05, 0.02, 0.07
 def stored_run() -> StoredRun:
     """Return a run in which the encoder is off by a constant, beside its lag; its reference is early by the lead."""
     run_input = short_run_input()
-    motion = TableMotion(run_input.plan, run_input.problem.limits)
+    motion = run_input.motion()
     seen = []
     for column, time_s in enumerate(motion.column_times_s.tolist()):
         reference_deg = motion.state_at(time_s + LEAD_S).angle_deg
