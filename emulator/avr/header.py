@@ -10,8 +10,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from emulator.config.constants import firmware_constants
-from emulator.config.table_config import TableConfig
-from emulator.config.table_config import ConfigError
+from emulator.config.table_config import ConfigError, TableConfig
 from emulator.firmware.fixed_point import GAIN_BITS, INTEGRAL_GAIN_BITS
 from emulator.firmware.pid import Gains
 from emulator.table.interpreter import Interpreter
