@@ -3,7 +3,7 @@
 from planner.errors import PlannerError
 from planner.execution.table_motion import Phase, TableMotion
 from planner.map.config_map import ConfigurationMap, sample_at_or_above, sample_at_or_below
-from planner.table.velocity_profile import way_to_rest_deg
+from protocol.trapezoid import way_to_rest_deg
 
 _TURN_DEG = 360.0
 

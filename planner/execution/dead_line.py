@@ -13,7 +13,7 @@ from planner.execution.clear_path import is_clear
 from planner.execution.run_record import Record, Sent
 from planner.execution.table_motion import Leg, Phase, TableMotion
 from planner.map.config_map import ConfigurationMap
-from planner.table.velocity_profile import ReferenceState, advance, way_to_rest_deg
+from protocol.trapezoid import ReferenceState, advance, way_to_rest_deg
 
 MOMENT_S = 0.02
 """From one moment to the next."""

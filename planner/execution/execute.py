@@ -16,12 +16,12 @@ from planner.execution.stream_correction import CorrectedStream
 from planner.execution.table_motion import MotionInTime, TableMotion
 from planner.execution.table_watch import StrayedError, TableWatch
 from planner.table.motion import Limits
-from planner.table.velocity_profile import MotionCommand, ReferenceState, time_to_rest_s
 from planner.table.wire import Grid, Wire, command_line, exchanges_s
 from protocol import ArrivalTimeout, CommandRefused, TableClient, TableError, Verb
 from protocol.bench import GroundTruth
 from protocol.interrupts import signals_wait
 from protocol.progress import Progress
+from protocol.trapezoid import MotionCommand, ReferenceState, time_to_rest_s
 
 # Between the last reading and the next command: what the operating system may take.
 _SLACK_S = 0.005

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from planner.execution.run_on import latest_s, least_rate
 from planner.execution.table_motion import Leg, TableMotion
 from planner.table.motion import Limits
-from planner.table.velocity_profile import MotionCommand
 from planner.table.wire import Wire, exchanges_s
+from protocol.trapezoid import MotionCommand
 
 # What the reference may deviate between two commands because A is greater than that of the plan.
 _DEVIATION_DEG = 0.1

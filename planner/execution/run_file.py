@@ -22,9 +22,9 @@ from planner.execution.run_verification import RunVerification
 from planner.execution.table_motion import PauseTimes, Phase, TableMotion
 from planner.map.map_file import MAP_FILE
 from planner.planning.plan_file import PLAN_FILE
-from planner.table.velocity_profile import MotionCommand
 from planner.table.wire import Wire
 from protocol.data_file import DataFileError, read_json
+from protocol.trapezoid import MotionCommand
 from protocol.whole_file import whole_file, write_whole
 
 _FORMAT = "seventh-axis run"

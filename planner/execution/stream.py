@@ -1,7 +1,7 @@
 """From a planned motion to timed commands: one `A`, `S`, `P` for each step, no I/O.
 
 The wire carries one decimal. Rounding each value on its own would let the errors add up, so each step starts from where
-the reference is *predicted* to be, exactly, after all commands before it (`velocity_profile`), and takes the S, the A
+the reference is *predicted* to be, exactly, after all commands before it (`protocol.trapezoid`), and takes the S, the A
 and the moment that bring it nearest to the plan at the step's end (`closest_command`): what one step could not say, the
 next one takes out. Steps that are too long for one command get several (`pieces`).
 """
@@ -17,8 +17,8 @@ from planner.execution.pieces import farthest_deg, pieces_of, spacing_s
 from planner.execution.run_on import latest_s, next_command_within_s
 from planner.execution.table_motion import Leg, MotionInTime, TableMotion
 from planner.table.motion import Limits
-from planner.table.velocity_profile import MotionCommand, ReferenceState, advance
 from planner.table.wire import Grid, StreamError, Wire, exchanges_s
+from protocol.trapezoid import MotionCommand, ReferenceState, advance
 
 # From this share of the greatest acceleration on, a plan leaves nothing to make up for an error of the speed.
 _AT_LIMIT = 0.97

@@ -14,8 +14,8 @@ from planner.execution.run_record import Correction
 from planner.execution.stream import Streaming, TimedCommand, check_it_fits
 from planner.execution.table_motion import TableMotion
 from planner.table.motion import Limits
-from planner.table.velocity_profile import MotionCommand, ReferenceState
 from planner.table.wire import Wire, exchanges_s
+from protocol.trapezoid import MotionCommand, ReferenceState
 
 # A reference farther than this from where the stream had it is worth a new stream.
 _SLIP_DEG = 0.03

@@ -16,7 +16,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.planning.plan import Pause, Plan
 from planner.table.motion import Limits
-from planner.table.velocity_profile import MotionCommand, ReferenceState, advance, move, time_to_rest_s
+from protocol.trapezoid import MotionCommand, ReferenceState, advance, move, time_to_rest_s
 
 # What the drive needs after its profile has ended, until the table stands.
 _SETTLING_S = 0.3

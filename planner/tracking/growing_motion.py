@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from planner.execution.table_motion import Leg, PauseTimes, Phase, pause_legs, stop_leg
 from planner.planning.plan import Pause
 from planner.table.motion import Limits
-from planner.table.velocity_profile import ReferenceState
 from planner.tracking.online_planner import Kind, State, Step
+from protocol.trapezoid import ReferenceState
 
 # What lies so far back is forgotten: nobody streams or watches it any more.
 _REMEMBERED_S = 10.0

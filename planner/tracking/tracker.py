@@ -26,13 +26,13 @@ from planner.map.config_map import DEFAULT_EPSILON
 from planner.map.map_problem import MapProblem
 from planner.table.cost import Weights
 from planner.table.motion import Limits
-from planner.table.velocity_profile import MotionCommand
 from planner.table.wire import StreamError, Wire, exchanges_s
 from planner.tracking.decision import METHODS, costs_of_starts
 from planner.tracking.followed_arm import FollowedArm
 from planner.tracking.growing_motion import GrowingMotion
 from planner.tracking.online_planner import Blocked, Kind, OnlinePlanner, State, Step, Why, may_rest
 from planner.tracking.revealed_map import RevealedMap, WindowError
+from protocol.trapezoid import MotionCommand
 
 DECISION_S = 0.01
 """From the moment at which a decision is asked for to that at which its lines begin."""

@@ -16,8 +16,8 @@ from planner.execution.table_motion import TableMotion
 from planner.planning.plan import Plan
 from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
-from planner.table.velocity_profile import way_to_rest_deg
 from planner.table.wire import Wire
+from protocol.trapezoid import way_to_rest_deg
 from tools.bench.timing import print_table
 from tools.bench.virtual_run import VirtualRun, random_run_inputs, run_in_virtual_time, shipped_run_input
 
