@@ -114,6 +114,11 @@ class CompiledTable:
         return sent
 
     @property
+    def duty(self) -> int:
+        """The duty on the bridge in the coming tick, in PWM steps; below 0 it drives backwards."""
+        return self.chip.duty
+
+    @property
     def received_queue(self) -> int:
         """Bytes on their way to the firmware."""
         head, tail, _, _ = self._ring_indices()

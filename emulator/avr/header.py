@@ -200,7 +200,7 @@ def _check(config: TableConfig) -> None:
     count_deg, tick_hz, bits = config.counts_per_turn / 360, config.control.tick_hz, config.motion_bits
     factors = (count_deg, count_deg / tick_hz, count_deg / tick_hz**2)
     fits = all(
-        16 * (factor.numerator << (bits + 1)) < _WORD
+        100 * (factor.numerator << (bits + 1)) < _WORD
         and (factor.denominator * factor.numerator << (bits + 1)) < _WORD
         and factor.denominator < 1 << 32
         for factor in factors

@@ -14,10 +14,9 @@
 #define LAST_POSITION ((int64_t)INT32_MAX << MOTION_BITS)
 #define LONGEST_DISTANCE (INT64_C(1) << (31 + MOTION_BITS))
 
-static const struct scale position_scale = {(uint64_t)POSITION_NUMERATOR << (MOTION_BITS + 1), POSITION_DIVISOR};
-static const struct scale speed_scale = {(uint64_t)SPEED_NUMERATOR << (MOTION_BITS + 1), SPEED_DIVISOR};
-static const struct scale acceleration_scale = {
-    (uint64_t)ACCELERATION_NUMERATOR << (MOTION_BITS + 1), ACCELERATION_DIVISOR};
+static const struct scale position_scale = SCALE(POSITION_NUMERATOR, MOTION_BITS, POSITION_DIVISOR);
+static const struct scale speed_scale = SCALE(SPEED_NUMERATOR, MOTION_BITS, SPEED_DIVISOR);
+static const struct scale acceleration_scale = SCALE(ACCELERATION_NUMERATOR, MOTION_BITS, ACCELERATION_DIVISOR);
 
 static const char *const refusals[] = {
     [REFUSED_UNKNOWN_COMMAND] = "ERR 1 unknown command\r",

@@ -1,37 +1,33 @@
 #include "decimal.h"
 
+#include "arithmetic.h"
 #include "table_constants.h"
 
 _Static_assert(POSITION_WHOLE_MAX < 0xFFFFFFFF, "the whole part of a position has 32 bits");
 
-uint32_t divide(uint64_t *number, uint32_t divisor)
+/* Add a product to a number and divide the sum by 100, both a byte a round; return the remainder. The sum fits. */
+static uint8_t add_and_divide(uint64_t *number, const uint64_t *term, uint8_t factor)
 {
-    uint64_t quotient = *number;
-    uint32_t remainder = 0;
-    for (uint8_t bit = 64; bit != 0; --bit) {
-        const bool carry = (remainder & 0x80000000UL) != 0;
-        remainder = (remainder << 1) | (uint32_t)(quotient >> 63);
-        quotient <<= 1;
-        if (carry || remainder >= divisor) {
-            remainder -= divisor;
-            quotient |= 1;
-        }
-    }
-    *number = quotient;
-    return remainder;
-}
-
-/* Divide a number by ten in place, and return the remainder: a byte a round, with a product for the quotient. */
-static uint8_t divide_by_ten(uint64_t *number)
-{
-    uint8_t *bytes = (uint8_t *)number;
+    uint8_t *byte = (uint8_t *)number;
+    const uint8_t *term_byte = (const uint8_t *)term;
+    uint8_t carry = 0;
+    do {
+        const uint16_t sum = (uint16_t)((uint16_t)(*term_byte++ * factor) + *byte + carry);
+        *byte++ = (uint8_t)sum;
+        carry = (uint8_t)(sum >> 8);
+    } while (byte != (uint8_t *)(number + 1));
     uint8_t remainder = 0;
-    for (uint8_t i = sizeof *number; i-- != 0;) {
-        const uint16_t part = (uint16_t)(remainder << 8 | bytes[i]);
-        const uint8_t quotient = (uint8_t)((part * 6554UL) >> 16); /* exact for parts below 2560 */
-        remainder = (uint8_t)(part - quotient * 10U);
-        bytes[i] = quotient;
-    }
+    do {
+        --byte;
+        /* remainder * 256 + byte = remainder * 200 + part; the quotient of part is right, or one too much */
+        const uint16_t part = (uint16_t)(remainder * 56U + *byte);
+        uint8_t quotient = (uint8_t)((part * 656UL) >> 16);
+        if ((uint16_t)(quotient * 100U) > part) {
+            --quotient;
+        }
+        *byte = (uint8_t)(remainder * 2U + quotient);
+        remainder = (uint8_t)(part - quotient * 100U);
+    } while (byte != (uint8_t *)number);
     return remainder;
 }
 
@@ -89,26 +85,34 @@ bool decimal_exceeds(const struct decimal *decimal, const struct decimal *limit)
     return false;
 }
 
+/* Return half of a number to which less than one is to be added if it is inexact, rounded; halves go to the even one. */
+static uint64_t halved(uint64_t twice, bool is_inexact)
+{
+    const bool is_half = (twice & 1) != 0, is_odd = (twice & 2) != 0;
+    return (twice >> 1) + (is_half && (is_inexact || is_odd) ? 1 : 0);
+}
+
 uint64_t decimal_scaled(const struct decimal *decimal, const struct scale *scale)
 {
-    /* The digits after the point, the last one first: twice the factor times 0.d1 d2 ... is (d1 twice + (d2 twice + ...
-       ) / 10) / 10. Each quotient is rounded down, and so is their whole; whether anything was lost is kept. */
+    /* The digits after the point in pairs, the last one first: twice the factor times 0.p1 p2 ... is (p1 twice + (p2
+       twice + ... ) / 100) / 100. Each quotient is rounded down, and so is their whole; whether anything was lost is
+       kept. */
     uint64_t twice = 0;
     bool is_inexact = false;
-    for (uint8_t i = decimal->digit_count; i-- != 0;) {
-        twice += scale->twice * (uint8_t)(decimal->digits[i] - '0');
-        is_inexact |= divide_by_ten(&twice) != 0;
+    for (uint8_t i = (uint8_t)((decimal->digit_count + 1U) & ~1U); i != 0; i = (uint8_t)(i - 2U)) {
+        const uint8_t tens = (uint8_t)(digit_at(decimal, (uint8_t)(i - 2U)) - '0');
+        const uint8_t ones = (uint8_t)(digit_at(decimal, (uint8_t)(i - 1U)) - '0');
+        is_inexact |= add_and_divide(&twice, &scale->twice, (uint8_t)(tens * 10U + ones)) != 0;
     }
     if (scale->divisor == 1) {
         twice += scale->twice * decimal->whole;
     } else {
-        twice += scale->twice * (decimal->whole % scale->divisor);
-        is_inexact |= divide(&twice, scale->divisor) != 0;
-        twice += scale->twice * (decimal->whole / scale->divisor);
+        const uint32_t quotient = decimal->whole / scale->divisor;
+        twice += scale->twice * (decimal->whole - quotient * scale->divisor);
+        is_inexact |= divide_by_reciprocal(&twice, scale->divisor, scale->reciprocal) != 0;
+        twice += scale->twice * quotient;
     }
-    const bool is_odd_half = (twice & 1) != 0, is_even_below = (twice & 2) == 0;
-    twice >>= 1;
-    return is_odd_half && (is_inexact || !is_even_below) ? twice + 1 : twice;
+    return halved(twice, is_inexact);
 }
 
 /* Return the magnitude of a count in units of the last decimal. */
@@ -120,11 +124,9 @@ static uint64_t angle_units(uint32_t magnitude)
         is_inexact = (twice & (ANGLE_DIVISOR - 1)) != 0;
         twice /= ANGLE_DIVISOR;
     } else {
-        is_inexact = divide(&twice, ANGLE_DIVISOR) != 0;
+        is_inexact = divide_by_reciprocal(&twice, ANGLE_DIVISOR, UINT64_MAX / ANGLE_DIVISOR) != 0;
     }
-    const bool is_odd_half = (twice & 1) != 0, is_even_below = (twice & 2) == 0;
-    twice >>= 1;
-    return is_odd_half && (is_inexact || !is_even_below) ? twice + 1 : twice;
+    return halved(twice, is_inexact);
 }
 
 uint8_t decimal_write_angle(char *text, int32_t count)

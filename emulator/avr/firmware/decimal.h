@@ -13,14 +13,15 @@ struct decimal {
     uint8_t digit_count;
 };
 
-/* A factor from a decimal to a register: `twice` / (2 `divisor`). */
+/* A factor from a decimal to a register: `twice` / (2 `divisor`). The reciprocal of the divisor has 64 fraction bits. */
 struct scale {
     uint64_t twice;
     uint32_t divisor;
+    uint64_t reciprocal;
 };
 
-/* Divide a number in place, and return the remainder. Slow: a bit a round. */
-uint32_t divide(uint64_t *number, uint32_t divisor);
+#define SCALE(numerator, fraction_bits, divisor) \
+    {(uint64_t)(numerator) << ((fraction_bits) + 1), (divisor), UINT64_MAX / (divisor)}
 
 /* Read `[+-]digits[.digits]`, which must be all of the text; the digits stay where they are. */
 bool decimal_read(struct decimal *decimal, const char *text, uint8_t length);

@@ -1,6 +1,6 @@
 #include "profiler.h"
 
-#include "decimal.h"
+#include "arithmetic.h"
 #include "table_constants.h"
 
 #define FRACTION_MASK ((1UL << MOTION_BITS) - 1)
@@ -17,42 +17,46 @@ bool profiler_is_at_rest(const struct reference *reference)
     return reference->speed == 0 && reference->distance == 0;
 }
 
-static bool can_brake(uint32_t speed, uint32_t acceleration, int64_t room)
+/* Return v (v + a): the room that a speed takes. */
+static uint64_t room_for(uint32_t speed, uint32_t acceleration)
 {
-    return (int64_t)((uint64_t)speed * (speed + acceleration)) <= room;
+    return (uint64_t)speed * (speed + acceleration);
 }
 
-/* Return the greatest speed v from `low` up to below `high` with v (v + a) <= room, or `low` if there is none; `high` is
-   too fast.
-
-   One bit of the result a round, as in a root by hand: a step s from v takes s (2v + a + s) of the room. What is left is
-   kept in units of s, so that a round works on 32 bits; a division of 64 bits would take half of the tick. */
-static uint32_t fastest_that_can_brake(uint32_t low, uint32_t high, uint32_t acceleration, int64_t room)
+/* Return 2v + a for the greatest speed v that the spare room allows, from the slope 2v + a of the start, by at most
+   `span`. A step s costs s (2v + a + s) of the room, as in a root by hand; what is left of it is in units of the step.
+   A function of its own, so that all of it stays in registers. */
+static __attribute__((noinline)) uint32_t climb(uint32_t slope, uint32_t span, uint64_t spare)
 {
-    const int64_t spare = room - (int64_t)((uint64_t)low * (low + acceleration));
-    if (spare <= 0 || high == low) {
-        return low;
-    }
-    uint8_t bits = 0;
-    while ((high - low) >> bits > 1) {
-        ++bits;
-    }
-    uint32_t left = (uint32_t)((uint64_t)spare >> bits), next_bits = (uint32_t)spare, slope = 2 * low + acceleration;
-    bool carry = ((uint64_t)spare >> bits) >> 32 != 0;
-    next_bits = bits == 0 ? 0 : next_bits << (32 - bits);
-    for (uint32_t step = 1UL << bits;; step >>= 1) {
-        if (carry || left >= slope + step) {
-            left -= slope + step;
-            slope += 2 * step;
-            low += step;
-        }
-        if (step == 1) {
-            return low;
+    uint32_t step = 0x80000000UL, left = (uint32_t)(spare >> 31), next_bits = (uint32_t)spare << 1;
+    bool carry = false;
+    do {
+        if (step <= span) {
+            slope += step;
+            if (carry || left >= slope) {
+                left -= slope;
+                slope += step;
+            } else {
+                slope -= step;
+            }
         }
         carry = (left & 0x80000000UL) != 0;
         left = left << 1 | next_bits >> 31;
         next_bits <<= 1;
+        step >>= 1;
+    } while (step != 0);
+    return slope;
+}
+
+/* Return the greatest speed v from `low` up to below `high` with v (v + a) <= room, or `low` if there is none; `high` is
+   too fast. One bit of it a round, on 32 bits: a division of 64 bits would take half of the tick. */
+static uint32_t fastest_that_can_brake(uint32_t low, uint32_t high, uint32_t acceleration, uint64_t room)
+{
+    const uint64_t taken = room_for(low, acceleration);
+    if (room <= taken) {
+        return low;
     }
+    return (climb(2 * low + acceleration, high - low, room - taken) - acceleration) >> 1;
 }
 
 /* Return the way until the next tick towards a target ahead, and change the speed to that of the next tick.
@@ -74,8 +78,9 @@ static int32_t advance(const struct profile *profile, int32_t *speed, int64_t di
         return (int32_t)distance;
     }
     if (fastest > 0 && distance < profile->far) {
-        const int64_t room = acceleration * (2 * distance - now);
-        if (!can_brake((uint32_t)fastest, (uint32_t)acceleration, room)) {
+        const int64_t twice = 2 * distance - now;
+        const uint64_t room = twice > 0 ? (uint64_t)twice * (uint32_t)acceleration : 0;
+        if (room_for((uint32_t)fastest, (uint32_t)acceleration) > room) {
             const uint32_t low = slowest > 0 ? (uint32_t)slowest : 0;
             fastest = (int32_t)fastest_that_can_brake(low, (uint32_t)fastest, (uint32_t)acceleration, room);
         }

@@ -22,6 +22,7 @@ DEFINE_FIFO(uint16_t, uart_fifo);
 #define AFTER_TICK 300     /* cycles from the entry of the tick's interrupt to the end of the slice */
 #define GUARD 150          /* cycles that are kept free of events before a tick and after a slice */
 #define TRIGGER_PULSE 400  /* cycles */
+#define BEAT 20            /* cycles */
 #define MOST_EVENTS 1024
 #define MOST_SENT 256
 #define FIRST_PHASE 2      /* of the encoder: both channels high, as the pull-ups hold them */
@@ -76,6 +77,14 @@ static avr_cycle_count_t end_of_slice(avr_t *avr, avr_cycle_count_t when, void *
     (void)when;
     (void)param;
     return 0; /* it only keeps `avr_run` from sleeping beyond the slice */
+}
+
+/* Keeps `avr_run` from sleeping for more than a few cycles. */
+static avr_cycle_count_t beat(avr_t *avr, avr_cycle_count_t when, void *param)
+{
+    (void)avr;
+    (void)param;
+    return when + BEAT;
 }
 
 static void tick_changed(avr_irq_t *irq, uint32_t is_running, void *param)
@@ -136,7 +145,7 @@ static void pull_trigger(struct chip *chip)
     avr_cycle_timer_register(chip->avr, TRIGGER_PULSE, end_of_pulse, chip);
 }
 
-/* A byte is in the receiver. simavr's own pump is not used: it counts a parity bit that is not sent. */
+/* A byte is in the receiver. simavr's own pump is not used: it knows no instant of arrival. */
 static void receive(struct chip *chip, uint8_t byte)
 {
     avr_uart_t *uart = chip->uart;
@@ -180,6 +189,7 @@ static int run_slice(struct chip *chip)
     avr_t *avr = chip->avr;
     const avr_cycle_count_t limit = avr->cycle + 4 * chip->tick_period + FREQUENCY / 100;
     chip->has_ticked = 0;
+    chip->uart->cycles_per_byte = chip->byte_cycles; /* simavr counts a parity bit that is not sent */
     while (!chip->has_ticked || avr->cycle < chip->slice_end) {
         const int state = avr_run(avr);
         if (state == cpu_Done || state == cpu_Crashed) {
@@ -337,21 +347,16 @@ int chip_idle(struct chip *chip, uint32_t most)
     return (int)ticks;
 }
 
-/* Let the tick that has begun come to its end, so that the memory shows it. */
+/* Let the tick that has begun come to its end, and the lines that it released be answered, so that the memory shows
+   both: run until the controller sleeps, but leave room for what comes before the next tick. */
 void chip_settle(struct chip *chip)
 {
-    const avr_cycle_count_t limit = chip->tick_entry + chip->tick_period - 2 * GUARD;
-    avr_int_vector_t **running = chip->avr->interrupts.running;
-    while (chip->avr->cycle < limit) {
-        int is_in_tick = 0;
-        for (int n = 0; n < chip->avr->interrupts.running_ptr; ++n) {
-            is_in_tick |= running[n]->vector == TICK_VECTOR;
-        }
-        if (!is_in_tick) {
-            return;
-        }
+    const avr_cycle_count_t limit = chip->tick_entry + chip->tick_period * 3 / 4;
+    avr_cycle_timer_register(chip->avr, BEAT, beat, chip);
+    while (chip->avr->cycle < limit && chip->avr->state == cpu_Running) {
         avr_run(chip->avr);
     }
+    avr_cycle_timer_cancel(chip->avr, beat, chip);
 }
 
 /* Put an edge on the trigger now. */
