@@ -4,6 +4,7 @@ A client sends commands that pre-empt each other, numbers at all limits, and non
 changes, the power fails. After each tick the duty on both bridges must be the same, and in the end all replies.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +12,9 @@ from random import Random
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
 
+from emulator.avr.chip import Chip
 from emulator.avr.compiled_table import CompiledTable
+from emulator.avr.header import MOST_EDGES_S
 from emulator.config.table_config import TableConfig, load_config
 from emulator.table.table import Table
 
@@ -187,3 +190,43 @@ def random_line(chance: Random, config: TableConfig) -> bytes:
     value = scale * chance.choice((1.0, 1.0, 0.05, 0.0005)) * chance.random()
     sign = chance.choice(("", "", "+", "-")) if verb in "PR" else ""
     return f"{verb}{' ' * chance.randint(0, 2)}{sign}{value:.{digits}f}".encode()
+
+
+def run_edges(config: TableConfig, ticks: int, edges_s: int = MOST_EDGES_S, firmware: Path | None = None) -> Chip:
+    """Turn the shaft at a constant speed both ways, at any cycle of a tick, while the controller brakes and the line is
+    busy, and return the controller.
+
+    Raises:
+        PartingError: its count is not that of the edges.
+    """
+    table = CompiledTable(config, 0, firmware)
+    chip, per_tick = table.chip, edges_s / config.control.tick_hz
+    chip.unguard()
+    commands = b"".join(b"S %g\rA %g\rP %d\rH\rL\r" % (*_limits(config), angle) for angle in (9, -9, 90, -5, 1))
+    place = counted = sent = 0.0
+    for tick in range(ticks):
+        direction = 1 if tick < ticks // 2 else -1
+        end = place + direction * per_tick
+        edges = math.floor(end) - math.floor(place)
+        # As many bytes as the line carries in a tick, and one command at a time so that there is room for replies.
+        due = int((tick + 1) * config.serial.baud / 10 / config.control.tick_hz) - int(sent)
+        arriving = bytes(commands[(int(sent) + k) % len(commands)] for k in range(due))
+        chip.tick(place, direction * per_tick, end, edges, arriving, (0.5,) if tick % 7 == 0 else ())
+        place, sent, counted = end, sent + due, counted + edges
+        chip.take_sent()
+        _check_count(chip, counted, most=2)  # of edges that come while the tick is sampled
+    chip.tick(place, 0.0, place, 0)
+    _check_count(chip, counted, most=0)
+    if chip.lost_edges:
+        raise PartingError(f"the firmware lost {chip.lost_edges} edges")
+    return chip
+
+
+def _check_count(chip: Chip, counted: float, most: int) -> None:
+    count = chip.number("encoder_position", "<i")
+    if abs(count - counted) > most:
+        raise PartingError(f"the firmware counts {count} of {counted:g} edges")
+
+
+def _limits(config: TableConfig) -> tuple[float, float]:
+    return config.limits.speed_deg_s, config.limits.acceleration_deg_s2

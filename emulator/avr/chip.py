@@ -1,6 +1,7 @@
 """The controller in simavr: flash in, a control tick at a time, pins and memory out."""
 
 import ctypes
+import struct
 from collections.abc import Sequence
 from functools import cache
 
@@ -91,6 +92,10 @@ class Chip:
         """Put an edge on the trigger now."""
         self._library.chip_trigger(self._chip)
 
+    def unguard(self) -> None:
+        """Let events come at any cycle, also while a tick is sampled: then its count is right to one edge."""
+        self._library.chip_unguard(self._chip)
+
     def settle(self) -> None:
         """Let the tick that has begun come to its end, so that `memory` shows it."""
         self._library.chip_settle(self._chip)
@@ -139,6 +144,10 @@ class Chip:
         self._library.chip_read(self._chip, self._program.symbols[symbol] - DATA_SPACE, data, size)
         return data.raw
 
+    def number(self, symbol: str, layout: str) -> int:
+        """Return a variable of a layout of the module struct."""
+        return int(struct.unpack(layout, self.memory(symbol, struct.calcsize(layout)))[0])
+
     def _check(self, result: int) -> int:
         if result < 0:
             raise ChipError(f"the simulated controller does not go on: {_FAILURES.get(result, str(result))}")
@@ -164,6 +173,7 @@ def _library() -> ctypes.CDLL:
         "chip_idle": (ctypes.c_int, [handle, number]),
         "chip_settle": (None, [handle]),
         "chip_trigger": (None, [handle]),
+        "chip_unguard": (None, [handle]),
         "chip_read": (None, [handle, ctypes.c_uint16, text, ctypes.c_uint16]),
     }
     for name, (result, arguments) in shapes.items():

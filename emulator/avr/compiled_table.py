@@ -228,10 +228,10 @@ class CompiledTable:
             duty=now.duty / config.driver.duty_max,
             gain_set="ramp" if now.gain_set == RAMP else "hold",
             state=STATE_NAMES[now.motion],
-            latched_deg=self._number("latched_count", "<i") / count_deg,
+            latched_deg=self.chip.number("latched_count", "<i") / count_deg,
             received_queue=len(self._incoming.queue) + (head - tail) % 256,
             transmit_queue=(queued - left) % 256,
-            lost_bytes=self._number("lost_bytes", "<H"),
+            lost_bytes=self.chip.number("lost_bytes", "<H"),
             load_torque_Nm=self._load_torque_Nm,
             shaft_deg=(drive.angle_rad * self._encoder.count_rad + self._encoder.phase - 0.5) / count_deg,
             gap_deg=math.degrees(drive.angle_rad / config.gears.ratio - drive.table_angle_rad),
@@ -240,7 +240,7 @@ class CompiledTable:
     @property
     def overruns(self) -> int:
         """Ticks that came before the one before was over."""
-        return self._number("overruns", "<H")
+        return self.chip.number("overruns", "<H")
 
     def _switch_on(self, count: int) -> None:
         self.chip = Chip(self._program, self.config.control.tick_hz, self._bit_cycles, count)
@@ -276,9 +276,6 @@ class CompiledTable:
         names = ("receive_head", "receive_tail", "transmit_head", "transmit_tail")
         head, tail, queued, left = (self.chip.memory(name, 1)[0] for name in names)
         return head, tail, queued, left
-
-    def _number(self, symbol: str, layout: str) -> int:
-        return int(struct.unpack(layout, self.chip.memory(symbol, struct.calcsize(layout)))[0])
 
     @staticmethod
     def _refuse_faults(faults: tuple[Fault, ...]) -> None:

@@ -12,7 +12,7 @@ volatile int32_t latched_count;
 /* The interrupt counts modulo 2^16, which is quick. The two low bits are the phase of the encoder. */
 static volatile uint16_t edges;
 static uint16_t sampled_edges;
-static int32_t position;
+int32_t encoder_position; /* brought level at each tick */
 static bool trigger_was_high;
 
 /* Where between four counts the encoder stands: channels A and B are a Gray code. */
@@ -25,7 +25,7 @@ static inline uint8_t phase(void)
 void encoder_init(void)
 {
     edges = sampled_edges = phase();
-    position = latched_count = wake_count;
+    encoder_position = latched_count = wake_count;
     trigger_was_high = board_trigger_is_high();
 }
 
@@ -54,7 +54,7 @@ ISR(PCINT1_vect)
 {
     const bool is_high = board_trigger_is_high();
     if (!is_high || trigger_was_high) {
-        latched_count = position + (int16_t)(edges - sampled_edges);
+        latched_count = encoder_position + (int16_t)(edges - sampled_edges);
     }
     trigger_was_high = is_high;
 }
@@ -63,9 +63,9 @@ int32_t encoder_sample(void)
 {
     const uint16_t now = edges;
     /* In unsigned arithmetic, where running over the end of the range is defined: the counter goes on at the other. */
-    position = (int32_t)((uint32_t)position + (uint32_t)(int32_t)(int16_t)(now - sampled_edges));
+    encoder_position = (int32_t)((uint32_t)encoder_position + (uint32_t)(int32_t)(int16_t)(now - sampled_edges));
     sampled_edges = now;
-    return position;
+    return encoder_position;
 }
 
 int32_t encoder_latch(void)

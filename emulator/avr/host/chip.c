@@ -57,7 +57,7 @@ struct chip {
     avr_uart_t *uart;
     avr_irq_t *channel[2], *trigger;
     avr_cycle_count_t tick_period, tick_entry, slice_end, byte_cycles, line_free;
-    uint8_t has_ticked, phase;
+    uint8_t has_ticked, phase, is_unguarded;
     struct event events[MOST_EVENTS];
     int first_event, event_count;
     uint8_t on_the_line[MOST_SENT];
@@ -301,13 +301,17 @@ int chip_tick(struct chip *chip, double from, double straight, double to, int32_
               uint32_t byte_count, const double *triggers, uint32_t trigger_count)
 {
     avr_t *avr = chip->avr;
-    const avr_cycle_count_t earliest = chip->tick_entry + AFTER_TICK + GUARD;
+    const avr_cycle_count_t after_tick = chip->tick_entry + AFTER_TICK, next_tick = chip->tick_entry + chip->tick_period;
+    const avr_cycle_count_t earliest = chip->is_unguarded ? after_tick : after_tick + GUARD;
     const avr_cycle_count_t start = avr->cycle + 1 > earliest ? avr->cycle + 1 : earliest;
-    const avr_cycle_count_t end = chip->tick_entry + chip->tick_period - GUARD;
+    const avr_cycle_count_t end = chip->is_unguarded ? next_tick + AFTER_TICK : next_tick - GUARD;
     const double room = end > start ? (double)(end - start) : 0.0;
     double last_share = 0.0;
     int failed = 0;
-    chip->first_event = chip->event_count = 0;
+    /* Without the guard the tick may have come before the last edge. */
+    chip->event_count -= chip->first_event;
+    memmove(chip->events, chip->events + chip->first_event, (size_t)chip->event_count * sizeof *chip->events);
+    chip->first_event = 0;
     for (int32_t n = 0, all = edges < 0 ? -edges : edges; n < all; ++n) {
         const double level = edges > 0 ? floor(from) + 1.0 + n : floor(from) - n;
         double share = share_of(level - from, straight, to - from);
@@ -325,9 +329,16 @@ int chip_tick(struct chip *chip, double from, double straight, double to, int32_
         return -3;
     }
     if (chip->event_count) {
-        avr_cycle_timer_register(avr, chip->events[0].when - avr->cycle, next_event, chip);
+        const avr_cycle_count_t first = chip->events[0].when;
+        avr_cycle_timer_register(avr, first > avr->cycle ? first - avr->cycle : 1, next_event, chip);
     }
     return run_slice(chip);
+}
+
+/* Let events come at any cycle, also while a tick is sampled: then its count is right to one edge. */
+void chip_unguard(struct chip *chip)
+{
+    chip->is_unguarded = 1;
 }
 
 /* Run up to `most` ticks in which nothing comes from outside, until a duty is on the bridge; return how many. */
