@@ -71,7 +71,9 @@ class Settings(NamedTuple):
 class Commands(Protocol):
     """The commands of a motion, one after the other: of a plan, or decided as they come due."""
 
-    corrections: list[Correction]
+    @property
+    def corrections(self) -> list[Correction]:
+        """Where the stream was changed for drift; the list grows while the motion runs."""
 
     def next(self) -> TimedCommand | None:
         """Return the next command; None when all are sent."""

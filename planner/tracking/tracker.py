@@ -7,7 +7,7 @@ encoder reads.
 """
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -128,11 +128,13 @@ class Tracked(NamedTuple):
         command: what to send, so that it takes effect at its time.
         step: the step that was taken for it; None where the command belongs to the step before.
         targets: where the arm is to be in that step.
+        recounted: after a change of configuration, the columns ahead in the new one.
     """
 
     command: TimedCommand
     step: Step | None
     targets: tuple[JointTarget, ...]
+    recounted: tuple[Column, ...] = ()
 
 
 class _Known(NamedTuple):
@@ -197,6 +199,7 @@ class Tracker(FollowedReference):
         self._fault: PlannerError | None = None
         self._is_over = False
         self.corrections: list[Correction] = []
+        self._recounted: tuple[Column, ...] = ()
         self.missed, self.reconfigurations = 0, 0
 
     @property
@@ -215,6 +218,15 @@ class Tracker(FollowedReference):
     def state(self) -> State:
         """The state at the end of what is decided."""
         return self._online.state
+
+    @property
+    def settings(self) -> TrackSettings:
+        """How the path is tracked."""
+        return self._settings
+
+    def map_metadata(self, T_WS: FloatArray) -> Mapping[str, object]:
+        """Return what a map of locations (n, 4, 4) says of itself, but for its configuration."""
+        return self._rater.metadata(T_WS)
 
     @property
     def configuration(self) -> Configuration:
@@ -311,14 +323,16 @@ class Tracker(FollowedReference):
         """
         if self._is_over:
             return None
-        step, targets = None, ()
+        step: Step | None = None
+        targets: tuple[JointTarget, ...] = ()
         if not self._pieces:
             step, legs = self._next_legs(now_s)
             spacing = self._spacing_s(self.motion.state_at(self.motion.decided_s).angle_deg)
             for leg in legs:
                 self._pieces.extend(pieces_of_leg(leg, self._limits, spacing, self._settings.run_on_deg))
             targets = () if step is None else self._targets(step, legs)
-        return Tracked(self._command(self._pieces.popleft()), step, targets)
+        recounted, self._recounted = self._recounted, ()
+        return Tracked(self._command(self._pieces.popleft()), step, targets, recounted)
 
     def _next_legs(self, now_s: float) -> tuple[Step | None, tuple[Leg, ...]]:
         """Take the next step, or stop where the path ends."""
@@ -345,7 +359,8 @@ class Tracker(FollowedReference):
         before = standing_at(self._encoder.start) if self.running is None else self.running.reference_at
         choice = self._encoder.choice(self.running, before, piece)
         timed = TimedCommand(choice.time_s, piece, choice.command, before(choice.time_s))
-        return self._encoder.aimed(timed, piece.end_s + self._step_s)
+        latest_in_s = self._step_s - self._spacing_s(timed.expected.angle_deg)
+        return self._encoder.aimed(timed, piece.end_s + latest_in_s)
 
     def _targets(self, step: Step, legs: tuple[Leg, ...]) -> tuple[JointTarget, ...]:
         """Return the joints at the ends of a step's legs."""
@@ -369,30 +384,30 @@ class Tracker(FollowedReference):
         Raises:
             TrackError: it is not, or none serves.
         """
-        online, where = self._online, blocked.location - self._first_known
-        goals = np.stack([each.goal for each in self._known])
-        values, reasons = self._every.rate(goals[where : where + 1], blocked.location)
-        allowed = [c for c in range(len(values)) if (values[c] > DEFAULT_EPSILON).any()]
-        if self._settings.reconfigure:
-            for c in sorted(allowed, key=lambda each: -float(values[each].max())):
-                configuration = self._every.configurations[c]
-                if configuration is self.configuration:
-                    continue
-                rater = ColumnRater(self._problem, [configuration], self._angle_count)
-                revealed, columns = self._revealed(rater, self._first_known)
-                online.change(revealed, self._arm(configuration))
-                step = online.pause()
-                if isinstance(step, Step):
-                    self._rater = rater
-                    self.changed_columns = columns
-                    self.reconfigurations += 1
-                    return step
-        others = [self._every.configurations[c].label for c in allowed if self._every.configurations[c] is not self.configuration]
-        reason = _most_frequent(self._every.metadata(self._known[where].T_WS[np.newaxis]), reasons)
-        hint = f"; {', '.join(others)} would serve: allow it with --reconfigure" if others else "; in no configuration"
+        online, goal = self._online, self._known[blocked.location - self._first_known]
+        values, reasons = self._every.rate(goal.goal[np.newaxis], blocked.location)
+        brightness = values.max(axis=(1, 2))
+        others = [
+            self._every.configurations[c]
+            for c in np.argsort(-brightness, kind="stable")
+            if brightness[c] > DEFAULT_EPSILON and self._every.configurations[c] is not self.configuration
+        ]
+        for configuration in others if self._settings.reconfigure else ():
+            rater = ColumnRater(self._problem, [configuration], self._angle_count)
+            revealed, columns = self._revealed(rater, self._first_known)
+            online.change(revealed, self._arm(configuration))
+            step = online.pause()
+            if isinstance(step, Step):
+                self._rater, self._recounted = rater, columns[1:]
+                self.reconfigurations += 1
+                return step
+        own = self._every.configurations.index(self.configuration)
+        reason = _most_frequent(self._rater.metadata(goal.T_WS[np.newaxis]), reasons[own])
+        names = ", ".join(each.label for each in others)
+        hint = f"{names} would serve; allow that with --reconfigure" if others else "no configuration serves"
         raise TrackError(
-            f"location {blocked.location} has no allowed table angle in {self.configuration.label},"
-            f" mostly because of {reason}{hint if not self._settings.reconfigure or not others else ''}"
+            f"location {blocked.location} has no table angle that is allowed in {self.configuration.label}, mostly"
+            f" because of {reason}; {hint if not self._settings.reconfigure else 'no other configuration serves'}"
         )
 
     @property
@@ -414,10 +429,11 @@ class Tracker(FollowedReference):
 
     def _check_the_step_fits(self) -> None:
         needed_s = self._spacing_s(0.0)
+        fits_s = np.ceil(100.0 * needed_s) / 100.0
         if needed_s > self._step_s:
             raise StreamError(
                 f"the commands of a step, and its decision, take {1000.0 * needed_s:.0f} ms at {self._wire.baud} baud,"
-                f" and a step lasts {1000.0 * self._step_s:g} ms; a time step of {np.ceil(100.0 * needed_s) / 100.0:g} s"
+                f" and a step lasts {1000.0 * self._step_s:g} ms; a time step of {fits_s:g} s"
                 " would fit"
             )
 
@@ -436,9 +452,7 @@ class Tracker(FollowedReference):
     def _revealed(self, rater: ColumnRater, first: int) -> tuple[RevealedMap, tuple[Column, ...]]:
         """Return the known columns in one configuration."""
         values, reasons = rater.rate(np.stack([each.goal for each in self._known]), first)
-        revealed = RevealedMap(
-            self._angle_count, self._step_s, self._limits, self._weights, self._settings.view, first
-        )
+        revealed = RevealedMap(self._angle_count, self._step_s, self._limits, self._weights, self._settings.view, first)
         for column in values[0]:
             revealed.reveal(column)
         columns = zip(self._known, values[0], reasons[0], strict=True)
