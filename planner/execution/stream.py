@@ -108,9 +108,7 @@ class Encoder:
             # The command of the next piece may come at once, and needs its time on the line.
             latest_s = end_s - min(piece.duration_s, self._spacing_s)
             if running is not None:
-                # A step after the last command it may always come.
-                within_s = max(self._within_s(running), running.leg.duration_s)
-                latest_s = min(latest_s, running.time_s + within_s)
+                latest_s = min(latest_s, self.next_by_s(running))
             earliest_s, latest_s = begin_s, max(begin_s, latest_s)
         else:
             earliest_s = latest_s = first_s
@@ -119,6 +117,10 @@ class Encoder:
         planned = max(abs(leg.acceleration_deg_s2) for leg in (piece, self._motion.leg_at(end_s)))
         step = Step(begin_s, end_s, earliest_s, latest_s, middle, end, stands, planned > self._most_rate)
         return closest_command(before, step, self._grid, self._run_on_deg)
+
+    def next_by_s(self, running: TimedCommand) -> float:
+        """Return when the next command has to come at the latest, by plan: a step after this one it always may."""
+        return running.time_s + max(self._within_s(running), running.leg.duration_s)
 
     def _within_s(self, running: TimedCommand) -> float:
         """Return how soon after a command the next one has to come, for the run-on of the first to stay short."""

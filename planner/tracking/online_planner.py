@@ -179,6 +179,10 @@ class OnlinePlanner:
                 return Step(Kind.PAUSE, Why.DECIDED, start, self.state, 0.0, self.revealed.last, ())
         return Blocked(location)
 
+    def rehearse(self) -> None:
+        """Decide without taking the step, so that the first decision finds its machine code loaded."""
+        self._decided()
+
     def change(self, revealed: RevealedMap, arm: FollowedArm) -> None:
         """Go on in another arm configuration; the table rests, and a pause comes next."""
         self.revealed, self._arm = revealed, arm

@@ -46,11 +46,12 @@ class TrackRecord:
         self._angle_count = len(column.values)
         self._file.seek(column.location * 9 * self._angle_count)
         self._file.write(column.values.tobytes() + column.reasons.tobytes())
-        del self.T_WS[column.location :]
-        self.T_WS.append(column.T_WS)
+        self.T_WS[column.location : column.location + 1] = [column.T_WS]
 
     def tracked(self, tracked: Tracked, seconds: float) -> None:
         """Take note of a command, and of the step that it begins."""
+        for column in tracked.recounted:
+            self.revealed(column)
         leg = tracked.command.leg
         step = tracked.step
         if step is None:

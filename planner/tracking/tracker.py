@@ -297,6 +297,7 @@ class Tracker(FollowedReference):
             self._goals,
         )
         self._planner.ended = self._ended
+        self._planner.rehearse()
         self.motion = GrowingMotion(angle_deg, self._step_s, self._limits, self._settings.pause_times)
         self._encoder = Encoder(
             self.motion, self._limits, self._wire, self._settings.run_on_deg, self._spacing_s(angle_deg)
@@ -359,8 +360,8 @@ class Tracker(FollowedReference):
         before = standing_at(self._encoder.start) if self.running is None else self.running.reference_at
         choice = self._encoder.choice(self.running, before, piece)
         timed = TimedCommand(choice.time_s, piece, choice.command, before(choice.time_s))
-        latest_in_s = self._step_s - self._spacing_s(timed.expected.angle_deg)
-        return self._encoder.aimed(timed, piece.end_s + latest_in_s)
+        latest_s = piece.end_s + self._step_s - self._spacing_s(timed.expected.angle_deg)
+        return self._encoder.aimed(timed, min(latest_s, self._encoder.next_by_s(timed)))
 
     def _targets(self, step: Step, legs: tuple[Leg, ...]) -> tuple[JointTarget, ...]:
         """Return the joints at the ends of a step's legs."""
