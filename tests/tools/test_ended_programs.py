@@ -32,7 +32,7 @@ time_step_s = 0.5
 """
 SLOWLY = 0.3
 """The time scale of the emulator under a scan that would soon be over."""
-STANDS = re.compile(r"the table was stopped, and stands at (-?[0-9.]+) deg")
+STANDS = re.compile(r"the table was stopped and stands at (-?[0-9.]+) deg")
 
 
 class StandIn(NamedTuple):

@@ -166,7 +166,7 @@ def test_an_interrupt_stops_the_table() -> None:
 
     record = run(motion_at(10.0, 4.0), port, progress=interrupt)
     assert record.failure is not None
-    assert record.failure.startswith("interrupted; the table was stopped, and stands at ")
+    assert record.failure.startswith("interrupted; the table was stopped and stands at ")
     assert stands(port)
     assert port.table.status().reference_deg < 20.0
 

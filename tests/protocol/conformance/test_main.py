@@ -184,7 +184,7 @@ def test_the_list_shows_clauses_and_needs(capsys: pytest.CaptureFixture[str]) ->
     ("words", "sentence"),
     [
         (["--port", "emulator://"], "give --port URL and --out DIR"),
-        (["--port", "emulator://", "--out", "OUT", "--case", "12"], "--case: no case begins with 12"),
+        (["--port", "emulator://", "--out", "OUT", "--case", "12"], "--case: no case id starts with 12"),
         (["--port", "emulator://", "--out", "OUT", "--case", ""], "--case: a prefix is empty; leave the option out"),
         (["--port", "emulator://", "--out", "OUT", "--junit", "/"], "--junit /: is a directory; name a file"),
         (["--port", "emulator://", "--out", "/x", "--junit", "/x/record.json"], "goes to another file of --out; name"),

@@ -70,7 +70,7 @@ def test_what_such_a_table_lacks_is_said(tmp_path: Path) -> None:
         "a way to switch the table off and on not available",
         "a way to preset the position counter not available",
         "a view of the encoder beside the wire not available",
-        "a table that sees its client go not available",
+        "a table that detects when its client disconnects not available",
         "error replies not available",
     }
 

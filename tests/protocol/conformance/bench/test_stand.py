@@ -46,7 +46,7 @@ def test_what_has_a_program_can_be_done() -> None:
     ("command", "sentence"),
     [
         (FAILURE, "rig.trigger_command, `sh -c 'echo the relay is stuck >&2; exit 3'`, ended with status 3: the relay"),
-        (("false",), "rig.trigger_command, `false`, ended with status 1, and said nothing"),
+        (("false",), "rig.trigger_command, `false`, ended with status 1 without output"),
         (("sh", "-c", "kill -9 $$"), "ended with status -9"),
     ],
 )
@@ -82,7 +82,7 @@ def test_a_program_that_is_not_there_is_told_before_anything_moves(
     words = ["--port", "loop://", "--yes", "--profile", str(profile), "--out", str(tmp_path / "out")]
     assert main(words) == 2
     said = capsys.readouterr().err
-    assert "rig.trigger_command: there is no program 'no-such-program' here" in said
+    assert "rig.trigger_command: program not found: 'no-such-program'" in said
     assert said.count("\n") == 1
 
 

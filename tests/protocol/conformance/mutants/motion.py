@@ -138,7 +138,7 @@ class CreepsHome(InTwoSteps):
 class CreepsOn(InTwoSteps):
     """after a motion it creeps on"""
 
-    says = "at rest the table was read at"
+    says = "readings at rest range from"
     slower = 200
 
     def instead(self, command: Command) -> Command:

@@ -31,7 +31,7 @@ class SparesItsCable(Rereads):
 class OkIsArrival(Mutant):
     """P is answered once the table is there"""
 
-    says = "was there with its OK"
+    says = "had arrived when it sent OK"
     held = b""
 
     def _reply(self, command: Line) -> bytes:

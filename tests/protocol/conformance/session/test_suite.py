@@ -175,7 +175,7 @@ def test_what_a_table_lacks_is_skipped_with_its_reason(tmp_path: Path) -> None:
         if case.id in {"3.1/5", "5.2/4", "6.2/1", "7.1/1"}
     }
     assert reasons == {
-        "3.1/5": "a table that sees its client go not available",
+        "3.1/5": "a table that detects when its client disconnects not available",
         "5.2/4": "waived by the profile: its printf",
         "6.2/1": "a trigger input that the rig can drive not available",
         "7.1/1": "turns by 30 deg, the profile allows 10",
@@ -247,7 +247,7 @@ def test_on_a_real_table_a_failing_walk_is_not_repeated_but_shrunk_on_the_stand_
     rigs = [rig_on(port_to(MUTANTS["R counts from the old target"][1]), seed) for seed in range(8)]
     for rig in rigs:
         rig.wire.port.inner = UnclockedPort(rig.wire.port.inner)
-    assert first_failure(rigs).endswith("the emulator walks the same way without fault")
+    assert first_failure(rigs).endswith("the emulator passes the same walk")
 
 
 def first_failure(rigs: Sequence[Rig]) -> str:
