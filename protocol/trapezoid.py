@@ -36,7 +36,7 @@ class Segment(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """A motion from a position and a speed to a target, segment by segment."""
+    """A motion from a position and a speed to a target, as a sequence of phases."""
 
     start: ReferenceState
     target_deg: float

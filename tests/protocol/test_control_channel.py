@@ -51,7 +51,7 @@ def serving(path: Path, stand: QuietStand) -> Iterator[ControlChannel]:
 
 @contextmanager
 def answering(path: Path, answer: Callable[[socket.socket], None]) -> Iterator[None]:
-    """Let something that is no emulator answer the next client."""
+    """Let something that is not an emulator reply to the next client."""
 
     def serve() -> None:
         client, _ = listener.accept()
@@ -145,7 +145,7 @@ def test_a_stand_in_that_takes_nobody_in_is_not_waited_for(folder: Path) -> None
 def test_a_listener_that_hangs_up_is_named(folder: Path) -> None:
     with (
         answering(folder / "control", lambda _: None),
-        pytest.raises(BenchError, match="closed the connection without an answer"),
+        pytest.raises(BenchError, match="closed the connection without a reply"),
     ):
         request(folder / "control", "trigger")
 

@@ -37,9 +37,9 @@ def test_a_silent_table_is_told_from_one_that_says_something_else() -> None:
 def test_a_time_out_tells_whether_the_command_was_sent() -> None:
     client = client_in_place(port := TablePort())
     port.give_fates(*[lost] * 10)
-    with pytest.raises(ReplyTimeout, match=r"sent b'P 1.0\\r', .* it may have been carried out"):
+    with pytest.raises(ReplyTimeout, match=r"sent b'P 1.0\\r', .* it may have been executed"):
         client.move_to(1)
-    with pytest.raises(ReplyTimeout, match="nothing else was sent"):
+    with pytest.raises(ReplyTimeout, match="no other command was sent"):
         client.move_to(2)
     assert Command(Verb.MOVE_TO, Decimal(2)) not in port.heard
 

@@ -135,7 +135,7 @@ def hang_up() -> Iterator[str]:
 @pytest.mark.parametrize(
     ("port", "sentence"),
     [
-        ("loop://", "each way from where it stands, at up to 40 deg/s and 100 deg/s2; say --table-yes if it may"),
+        ("loop://", "each way from where it stands, at up to 40 deg/s and 100 deg/s2; add --table-yes to allow this"),
         ("/dev/none", "cannot open /dev/none"),
     ],
 )

@@ -79,7 +79,7 @@ class LazyTriangles(Scales):
 class RoundsTheSpeedUp(Scales):
     """S is rounded up to the next step of its timer, a fifth above"""
 
-    says = "highest speed"
+    says = "maximum speed"
     speed_percent = 120
 
 

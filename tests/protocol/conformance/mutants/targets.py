@@ -137,7 +137,7 @@ class StopsAtTheEndOfTheCounter(Rereads):
 class StumblesOverTheEnd(Mutant):
     """at the end of the counter the reference's speed steps to 0"""
 
-    says = "over the end and back"
+    says = "past the limit and back"
 
     def advance(self, ticks: int) -> None:
         before = self._loop.state.firmware.reference.position_count

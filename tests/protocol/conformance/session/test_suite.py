@@ -178,7 +178,7 @@ def test_what_a_table_lacks_is_skipped_with_its_reason(tmp_path: Path) -> None:
         "3.1/5": "a table that detects when its client disconnects not available",
         "5.2/4": "waived by the profile: its printf",
         "6.2/1": "a trigger input that the rig can drive not available",
-        "7.1/1": "turns by 30 deg, the profile allows 10",
+        "7.1/1": "turns by 30 deg; the profile allows 10",
     }
 
 
@@ -204,13 +204,13 @@ def test_a_port_that_dies_is_an_error_of_the_case() -> None:
 def test_a_silent_port_cannot_be_tested() -> None:
     port = port_to(Mutant)
     port.table.inject(fault_from("silence", {}))
-    with pytest.raises(SessionError, match="no answer to 'H' within 1 s; is the table on"):
+    with pytest.raises(SessionError, match="no reply to 'H' within 1 s; check the power of the table"):
         Session(RecordedPort(port), load_profile(), InProcess(port.table))
 
 
 def test_a_port_that_is_no_table_cannot_be_tested() -> None:
     port = RecordedPort(serial.serial_for_url("loop://"))
-    with pytest.raises(SessionError, match="is no table of this protocol"):
+    with pytest.raises(SessionError, match="is not a table of this protocol"):
         Session(port, load_profile(), Stand())
 
 
