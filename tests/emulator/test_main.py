@@ -150,7 +150,7 @@ def test_a_trace_for_which_there_is_no_room_is_said_and_what_was_written_stays(t
         ask(port, b"P 10")
         _, stderr = process.communicate(timeout=10)  # the limit ends it
     assert process.returncode == 2
-    assert stderr.splitlines()[-1].endswith(f"what was written until then is in {tmp_path / 'run.csv.part'}, as CSV")
+    assert stderr.splitlines()[-1].endswith(f"the rows written so far are in {tmp_path / 'run.csv.part'}, as CSV")
     assert [path.name for path in tmp_path.iterdir()] == ["run.csv.part"]
     assert len((tmp_path / "run.csv.part").read_bytes()) in {512, 1024}  # the unit of `ulimit -f`
 

@@ -60,7 +60,7 @@ def test_leaving_the_block_closes_the_port() -> None:
 def test_a_refusal_tells_what_was_sent_what_came_back_and_what_to_do() -> None:
     client = client_in_place(TablePort())
     with pytest.raises(
-        CommandRefused, match=r"sent b'P 2000.0\\r', got ERR 3 out of range: ask for .* limits"
+        CommandRefused, match=r"sent b'P 2000.0\\r', got ERR 3 out of range: use a value .* limits"
     ) as refusal:
         client.move_to(2000)
     assert refusal.value.code is ErrorCode.OUT_OF_RANGE
@@ -115,7 +115,7 @@ def test_arrival_is_two_readings_in_a_row_at_the_target() -> None:
 
 def test_a_table_that_passes_by_has_not_arrived() -> None:
     client = TableClient(MovingTablePort(speed_deg_s=10, target_deg=90))
-    with pytest.raises(ArrivalTimeout, match=r"stands at 90\.0 deg") as arrival:
+    with pytest.raises(ArrivalTimeout, match=r"the table is at 90\.0 deg") as arrival:
         client.wait_until_at(30, tolerance_deg=0.25, timeout_s=20)
     assert arrival.value.position_deg == 90
 

@@ -128,7 +128,7 @@ def test_where_nobody_listens_no_channel_is_opened(path: str, folder: Path) -> N
 def test_an_answer_of_something_else_is_never_taken_for_a_look_at_a_table(reply: bytes, folder: Path) -> None:
     with (
         answering(folder / "control", lambda client: client.sendall(reply)),
-        pytest.raises(BenchError, match="not an answer of an emulator"),
+        pytest.raises(BenchError, match="not a reply of an emulator"),
     ):
         ControlChannel(folder / "control")
 

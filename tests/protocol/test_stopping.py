@@ -238,7 +238,7 @@ def test_a_dead_line_is_told_with_what_the_table_will_do() -> None:
     table.inject(fault_from("hang-up", {}))
     with pytest.raises(
         NotStopped,
-        match=r"the device has gone.*it continues to its last target, 300 deg, and stops there within 13\.\d s$",
+        match=r"the device has disappeared.*it continues to its last target, 300 deg, and stops there within 13\.\d s$",
     ):
         client.stop()
 

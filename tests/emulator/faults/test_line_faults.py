@@ -93,7 +93,7 @@ def test_a_port_that_hung_up_is_dead_until_it_returns_and_the_motion_goes_on(ben
     with pytest.raises(PortError):
         bench.client.position_deg()
     bench.port.close()
-    with pytest.raises(serial.SerialException, match="the device has gone"):
+    with pytest.raises(serial.SerialException, match="the device has disappeared"):
         bench.port.open()
     bench.client.clock.sleep_s(4)
     bench.port.open()
@@ -118,7 +118,7 @@ def test_a_pulled_port_comes_back_under_its_link(stand_in: Callable[..., Any], t
         command(control, "fault-hang-up", "--for-s", "0.3")
         with pytest.raises(TableError):
             read_often(client)
-    running.wait_for_words("has come back")
+    running.wait_for_words("is available again")
     with TableClient.open(str(link)) as client:
         assert client.position_deg() == 0.0
 

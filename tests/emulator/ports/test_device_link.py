@@ -31,7 +31,7 @@ def test_a_link_that_was_left_behind_is_replaced(tmp_path: Path) -> None:
 def test_an_ordinary_file_is_never_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "thesis.tex"
     path.write_text("three years of work")
-    with pytest.raises(FileExistsError, match="something else"):
+    with pytest.raises(FileExistsError, match="is not a link to a pty"):
         DeviceLink(path, DEVICE)
     assert path.read_text() == "three years of work"
 
@@ -63,7 +63,7 @@ def test_a_link_whose_place_another_file_has_taken_leads_nowhere_new(tmp_path: P
     link = DeviceLink(path, DEVICE)
     path.unlink()
     path.write_text("three years of work")
-    with pytest.raises(FileExistsError, match="something else"):
+    with pytest.raises(FileExistsError, match="is not a link to a pty"):
         link.lead_to(OTHER_DEVICE)
     assert path.read_text() == "three years of work"
 

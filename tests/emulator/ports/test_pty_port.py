@@ -117,7 +117,7 @@ def test_two_clients_in_one_look_are_warned_of_only_where_a_line_is_refused(
     os.close(client)
     os.write(opened(port.name), second)
     assert port.receive().is_doubtful
-    assert len([sentence for sentence in warnings if "one right after the other" in sentence]) == count
+    assert len([sentence for sentence in warnings if "in immediate succession" in sentence]) == count
 
 
 def test_bytes_that_came_after_the_last_look_may_be_of_a_client_that_left_then(port: PtyPort, opened: Open) -> None:

@@ -42,7 +42,7 @@ def test_facts_shows_what_clients_may_rely_on(stand: QuietStand) -> None:
         (b"[]", "object"),
         (b"{}", "names its command"),
         (b'{"command": 1}', "names its command"),
-        (b'{"command": "dance"}', "'dance' is not a command; there are trigger"),
+        (b'{"command": "dance"}', "'dance' is not a command; allowed are trigger"),
         (b'{"command": "trigger", "now": 1}', "takes no parameter"),
         (b'{"command": "load-torque"}', "takes torque_Nm"),
         (b'{"command": "load-torque", "torque_Nm": "1"}', "must be a number"),

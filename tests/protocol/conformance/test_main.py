@@ -255,7 +255,7 @@ def test_a_record_sent_to_another_table_shows_where_the_answers_part(
         ({"cases": [{}]}, "is damaged: KeyError 'id'"),
         ({"version": "1"}, "has version '1'; this program reads version 1"),
         ({"cases": []}, "contains no traffic of these cases; choose other cases"),
-        ({"cases": [{"id": "0.0/0", "wire": [[0, "sent", "H\r"]]}]}, "holds no wire of these cases"),
+        ({"cases": [{"id": "0.0/0", "wire": [[0, "sent", "H\r"]]}]}, "contains no traffic of these cases"),
         (
             {"cases": [{"id": "4.5/4", "wire": [["soon", "sent", "H\r"]]}]},
             "is damaged: ValueError 'soon' is not a time",
@@ -264,7 +264,7 @@ def test_a_record_sent_to_another_table_shows_where_the_answers_part(
             {"cases": [{"id": "4.5/4", "wire": [[0, "shouted", "H\r"]]}]},
             "'shouted' is not one of sent, received, beside",
         ),
-        ({"cases": [{"id": "4.5/4", "wire": [[0, "beside", "kick"]]}]}, "'kick' is nothing that is done beside the"),
+        ({"cases": [{"id": "4.5/4", "wire": [[0, "beside", "kick"]]}]}, "'kick' is not an action of the rig"),
         ({"cases": [{"id": "4.5/4", "wire": [[10**400, "sent", "H\r"]]}]}, "is damaged: OverflowError"),
         ({"home_deg": 10**400}, "is damaged: OverflowError"),
         ({"home_deg": float("inf")}, "Infinity is not a number"),

@@ -48,5 +48,5 @@ def test_each_case_catches_a_wrong_table() -> None:
 
 def test_with_a_table_at_another_rate_no_session_begins() -> None:
     port = port_to(Mutant, load_config().with_serial(baud=19200))
-    with pytest.raises(SessionError, match="is the table on, the cable right, and its rate 9600 baud"):
+    with pytest.raises(SessionError, match=r"check the power of the table, the cable, and the baud rate \(here 9600\)"):
         Session(RecordedPort(port), load_profile(), InProcess(port.table))

@@ -198,7 +198,7 @@ def test_a_port_that_dies_is_an_error_of_the_case() -> None:
     port.table.inject(fault_from("hang-up", {"at_s": port.clock.now_s() + 0.5}))
     outcomes = session.run(chosen_cases(["7.1/1"]))
     assert [outcome.verdict for outcome in outcomes] == [Verdict.ERROR] * 2
-    assert "the device has gone" in outcomes[0].reason
+    assert "the device has disappeared" in outcomes[0].reason
 
 
 def test_a_silent_port_cannot_be_tested() -> None:
