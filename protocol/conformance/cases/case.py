@@ -34,7 +34,7 @@ class Case:
 
 
 CASES: dict[str, Case] = {}
-"""Every registered case by its id. A case is registered when its file is imported; `catalogue` has all cases."""
+"""Every registered case by its id. A case is registered when its file is imported; `catalog` has all cases."""
 
 
 def case(identifier: str, *needs: str, travel_deg: float = 0.0) -> Callable[[Run], Run]:

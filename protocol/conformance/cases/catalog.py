@@ -1,4 +1,4 @@
-"""The catalogue of all cases, and their selection by id."""
+"""The catalog of all cases, and their selection by id."""
 
 import re
 from collections.abc import Sequence
