@@ -1,13 +1,13 @@
-"""The scan planner: from a scan to configuration maps, to a plan, to a verified run on the table.
+"""The scan planner: from a scan to configuration maps, a plan, and a verified run on the table.
 
     scan = planner.load_scan("cylinder")
     planned = planner.plan(scan)
     finished = planner.run(planned, "emulator://", "build/run")
 
-Each name is loaded when it is first used, so that `import planner` takes no time.
+Each name is loaded at its first use, so that `import planner` is fast.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the imports that take long
+import protocol.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 from importlib import import_module
@@ -45,7 +45,7 @@ _HOME = {
     "run": "planner.api",
     "with_factors": "planner.api",
 }
-"""Where each public name comes from."""
+"""The module of each public name."""
 
 __all__ = [
     "Configuration",

@@ -1,4 +1,4 @@
-"""What programs use of the planner, from a scan to maps, to a plan, to a verified run; see `import planner`."""
+"""The Python interface of the planner, from a scan to maps, a plan and a verified run; see `import planner`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -20,7 +20,7 @@ from planner.planning.scan_planning import PlannedScan, plan_scan
 
 
 def with_factors(scan: Scan, *factors: UserFactor) -> Scan:
-    """Return the scan with further factors of the value function."""
+    """Return the scan with additional factors of the value function."""
     return replace(scan, value=replace(scan.value, user_factors=(*scan.value.user_factors, *factors)))
 
 
@@ -30,8 +30,8 @@ def build_maps(
     """Return the maps `(locations, angle_count)` of a scan, by arm configuration.
 
     Raises:
-        PlannerError: The maps would have too many cells, or an installed factor failed.
-        ValueError: A factor of `with_factors` returned a wrong shape or a value outside 0 to 1.
+        PlannerError: the maps would have too many cells, or an installed factor failed.
+        ValueError: a factor of `with_factors` returned a wrong shape or a value outside of 0 to 1.
     """
     return maps_of(map_problem(scan), configurations, angle_count)
 
@@ -46,17 +46,17 @@ def plan(
     """Plan the table's motion along a scan.
 
     Args:
-        scan: What is scanned.
-        planner: A shipped planner or an installed plug-in by its name, or a function.
-        configuration: An arm configuration such as `LEFTY-ABOVE-NOFLIP`, or `best`.
-        angle_count: Table angles over one turn.
-        start_angle_deg: The table's angle at the first location; None leaves it free.
+        scan: the scan.
+        planner: the name of a shipped planner or an installed plug-in, or a function.
+        configuration: an arm configuration such as `LEFTY-ABOVE-NOFLIP`, or `best`.
+        angle_count: number of table angles over one turn.
+        start_angle_deg: table angle at the first location; None: any angle.
 
     Returns:
-        The plan that the arm can follow at the least cost, or, where there is none, why.
+        The plan with minimum cost that the arm can follow, or the reason why there is none.
 
     Raises:
-        PlannerError: A name is not known, or the planner returned something that is not an answer.
+        PlannerError: a name is unknown, or the planner returned an invalid result.
     """
     chosen: Planner = planner_named(planner) if isinstance(planner, str) else checked(_name(planner), planner)
     shipped = planner if isinstance(planner, str) else ""
@@ -74,18 +74,18 @@ def run(
     out: str | Path,
     options: RunOptions | None = None,
 ) -> Finished:
-    """Carry a plan out on the table at a port, verify the motion, and write what happened into a folder.
+    """Execute a plan on the table at a port, verify the motion, and write the results to a folder.
 
     Args:
-        planned: A plan, or the name of a `plan.json`.
-        port: A device, `socket://HOST:PORT`, or `emulator://` for a simulated table.
-        out: The folder.
-        options: All other settings; `port` in it does not count.
+        planned: a plan, or the name of a `plan.json`.
+        port: a device, `socket://HOST:PORT`, or `emulator://` for a simulated table.
+        out: the folder.
+        options: all other settings; its `port` is ignored.
 
     Raises:
-        PlannerError: The plan must not, or cannot, be run; nothing has moved.
-        TableError: The table could not be reached, or not be brought to the start.
-        OSError: The folder cannot be written.
+        PlannerError: the plan must not or cannot be executed; the table has not moved.
+        TableError: the table did not reply, or did not reach the start.
+        OSError: the folder cannot be written.
     """
     chosen = RunOptions(port) if options is None else options._replace(port=port)
     if not isinstance(planned, PlannedScan):

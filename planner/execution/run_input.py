@@ -1,4 +1,4 @@
-"""What `run` works on: a plan file, checked against the map that it was made on."""
+"""The input of `run`: a plan file, checked against its map."""
 
 import json
 from dataclasses import asdict, dataclass, replace
@@ -21,19 +21,19 @@ from planner.planning.verification import verify
 
 
 class RunInputError(PlannerError):
-    """A plan that must not be run: damaged, edited, or not of this map."""
+    """A plan that must not be executed: it is damaged, edited, or from another map."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunInput:
-    """A plan and what it was made on.
+    """A plan and its basis.
 
     Attributes:
-        name: what the scan is called.
-        plan: the table's motion.
+        name: name of the scan.
+        plan: the motion of the table.
         problem: map, limits and weights.
         joints_deg: (n + 1, 6) the arm's joints at each location.
-        arm: the arm that follows.
+        document: content of the plan file.
     """
 
     name: str
@@ -47,13 +47,13 @@ class RunInput:
         return TableMotion(self.plan, self.problem.limits, pause_times or PauseTimes())
 
     def with_cost(self) -> "RunInput":
-        """Return the same with the cost that the motion has, whatever the file says."""
+        """Return the same input with the computed cost of the motion, instead of the cost in the file."""
         plan = self.plan
         motion = plan.angles_deg, plan.speeds_deg_s, plan.accelerations_deg_s2
         return replace(self, plan=replace(plan, cost=path_cost(self.problem, *motion, plan.pauses)))
 
     def turned(self, turns: int) -> "RunInput":
-        """Return the same scan, full turns of the table farther."""
+        """Return the same scan, shifted by full turns of the table."""
         plan = self.plan
         shifted_deg = 360.0 * turns
         pauses = tuple(
@@ -66,7 +66,7 @@ class RunInput:
 
 
 def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
-    """Return a plan with its map, which is `map.npz` beside the plan unless another is given.
+    """Return a plan with its map, which is `map.npz` beside the plan unless another file is given.
 
     Raises:
         PlannerError: a file cannot be read, is damaged or edited, or plan and map do not belong together.
@@ -90,26 +90,28 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
 
 
 def _check(plan_file: Path, run_input: RunInput) -> None:
-    """Refuse a plan that breaks its own equations, its limits, or a forbidden region."""
+    """Refuse a plan that violates its own equations, its limits, or a forbidden region."""
     plan, problem = run_input.plan, run_input.problem
     locations = problem.map.location_count
     if len(plan.angles_deg) != locations or run_input.joints_deg.shape != (locations, 6):
-        raise RunInputError(f"{plan_file}: is damaged: its map has {locations} locations, and the plan has not")
+        raise RunInputError(f"{plan_file}: is damaged: the plan does not have the {locations} locations of its map")
     numbers = plan.angles_deg, plan.speeds_deg_s, plan.accelerations_deg_s2
     if not all(np.isfinite(array).all() for array in numbers):
-        raise RunInputError(f"{plan_file}: is damaged: it holds values that are no numbers")
+        raise RunInputError(f"{plan_file}: is damaged: it contains values that are not numbers")
     fault = contradiction(plan)
     if fault is not None:
         raise RunInputError(f"{plan_file}: has been edited: {fault}")
     checked = verify(problem, plan)
     if not checked.within_limits:
-        raise RunInputError(f"{plan_file}: exceeds its own limits; plan anew")
+        raise RunInputError(f"{plan_file}: exceeds its own limits; create the plan again")
     if checked.forbidden_steps:
-        raise RunInputError(f"{plan_file}: meets a forbidden region in step {checked.forbidden_steps[0]}; plan anew")
+        raise RunInputError(
+            f"{plan_file}: meets a forbidden region in step {checked.forbidden_steps[0]}; create the plan again"
+        )
 
 
 def _check_arm(plan_file: Path, run_input: RunInput, stored: StoredPlan) -> None:
-    """Refuse a plan that the arm cannot follow, by the file or by our own check, or whose arm is not the map's."""
+    """Refuse a plan that the arm cannot follow, by the file or by this check, or with an arm other than the map's."""
     if run_input.problem.map.metadata.get("arm") != json.loads(json.dumps(asdict(stored.arm.cell.arm))):
         raise RunInputError(f"{plan_file}: its arm is not the arm that its map was made for; compute map and plan anew")
     if len(stored.arm.T_WS) != run_input.problem.map.location_count:
@@ -117,6 +119,6 @@ def _check_arm(plan_file: Path, run_input: RunInput, stored: StoredPlan) -> None
     fault = arm_fault(stored.arm, stored.plan) or stored.arm_fault
     if fault is not None:
         raise RunInputError(
-            f"{plan_file}: the arm cannot follow the plan: {fault}; plan anew, with a path that turns the probe less or"
-            " takes more time"
+            f"{plan_file}: the arm cannot follow the plan: {fault}; create a plan for a path with less rotation of the"
+            " probe or more time"
         )

@@ -1,4 +1,4 @@
-"""Check the arm's side of a plan: does the arm hold the probe where the scan wants it, and within its limits?"""
+"""Check the arm's part of a plan: whether the arm holds the probe at the required poses within its limits."""
 
 from typing import NamedTuple
 
@@ -11,18 +11,18 @@ from planner.kinematics.joint_configurations import configurations
 from planner.kinematics.joint_limits import first_joint_fault
 from planner.planning.plan import Plan
 
-# Joints in a file carry nine decimals, which is some nanometers at the probe; a joint that is 0.001 deg off is seen.
+# Joints in a file have nine decimals, which is some nanometers at the probe; a joint error of 0.001 deg is detected.
 _POSITION_TOLERANCE_MM = 1e-3
 _AXIS_TOLERANCE = 1e-5
 
 
 class PlannedArm(NamedTuple):
-    """The arm's side of a plan.
+    """The arm's part of a plan.
 
     Attributes:
         cell: the arm and its placements.
         T_WS: (n + 1, 4, 4) the scan locations.
-        joints_deg: (n + 1, 6) the robot's own joint angles at the scan locations, on the turns that they are to have.
+        joints_deg: (n + 1, 6) the robot's own joint angles at the scan locations, on the intended turns.
     """
 
     cell: Cell
@@ -31,7 +31,7 @@ class PlannedArm(NamedTuple):
 
 
 def arm_fault(planned: PlannedArm, plan: Plan) -> str | None:
-    """Return why the arm cannot follow a plan, in a clause; None where it can."""
+    """Return why an arm cannot follow a plan, as a clause; None if it can."""
     cell, T_WS, joints_deg = planned
     fault = first_joint_fault(cell.arm, joints_deg, plan.step_s, [pause.step for pause in plan.pauses])
     if fault is not None:
@@ -51,5 +51,5 @@ def arm_fault(planned: PlannedArm, plan: Plan) -> str | None:
     asked = Configuration.parse(plan.configuration)
     others = np.flatnonzero(configurations(cell.arm, joints) != asked)
     if len(others):
-        return f"at location {int(others[0])} its joints are not {asked.label}, the configuration of the plan"
+        return f"at location {int(others[0])} the joints are not in {asked.label}, the configuration of the plan"
     return None

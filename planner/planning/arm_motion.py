@@ -1,4 +1,4 @@
-"""The arm's motion that belongs to a table's plan, piece by piece between pauses."""
+"""The motion of the arm for a plan of the table, in parts between pauses."""
 
 from dataclasses import dataclass
 
@@ -20,10 +20,10 @@ class ArmMotion:
     Attributes:
         arm: joint limits and joint speeds.
         joints: (n + 1, 6) in radians at each location; rows out of reach are NaN.
-        speeds_deg_s: (n + 1, 6) at which each location is reached; 0 at the start and after a pause.
+        speeds_deg_s: (n + 1, 6) speed of the step to each location; 0 at the start and after a pause.
         start_turns: (6,) whole turns of the robot's own angles at the start, counted from the turn nearest the middle
             of each joint's range.
-        reason: REACHED when the arm can follow the plan, else why it cannot.
+        reason: REACHED if the arm can follow the plan, else the reason why it cannot.
         step: the first location at which it cannot.
     """
 
@@ -55,8 +55,8 @@ class ArmMotion:
 def arm_motion(on_path: ArmOnPath, plan: Plan) -> ArmMotion:
     """Return the joints along a plan, and the first location at which the arm cannot follow it.
 
-    In a pause the arm retracts and approaches again, so neither its turns nor its speeds continue across one; of the
-    turns that serve after it, the nearest is taken.
+    In a pause the arm retracts and approaches again, so neither its turns nor its speeds continue across a pause. Of
+    the possible turns after it, the nearest is used.
     """
     arm = on_path.arm
     solved, reasons = on_path.solve(np.arange(len(plan.angles_deg)), plan.angles_deg)

@@ -12,7 +12,7 @@ from planner.kinematics.inverse_kinematics import inverse_kinematics
 
 @dataclass(frozen=True, eq=False)
 class ArmOnPath:
-    """What planning has to know of the arm.
+    """The arm data for planning.
 
     Attributes:
         arm: joint limits and joint speeds.

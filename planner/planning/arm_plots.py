@@ -1,4 +1,4 @@
-"""The picture of the arm's motion along a plan: each joint between its limits, and its speed below its maximum."""
+"""The plot of the arm's motion along a plan: each joint between its limits, and its speed below its maximum."""
 
 from pathlib import Path
 
@@ -29,7 +29,7 @@ def arm_figure(motion: ArmMotion, title: str) -> Figure:
 
 
 def plot_arm(motion: ArmMotion, title: str, file: Path) -> None:
-    """Write the picture of the arm's motion to `file`, which appears when it is whole."""
+    """Write the plot of the arm's motion to `file`, which appears when it is complete."""
     save_picture(arm_figure(motion, title), file)
 
 

@@ -1,8 +1,8 @@
-"""One backward step of dynamic programming (Bellman's equation): a column's cost-to-go from that of the next.
+"""One backward step of dynamic programming (Bellman's equation): a column's cost-to-go from that of the next column.
 
-Each step joins two speeds of the grid (`transitions.py`), so only the angle, one-dimensional and periodic, is
-interpolated. A value is interpolated from two finite ones or it is infinite, so no cost leaks across the border of
-what can be crossed.
+Each step connects two speeds of the grid (`transitions.py`). So only the angle, one-dimensional and periodic, is
+interpolated. An interpolated value comes from two finite ones or is infinite, so no finite cost crosses the border of
+the region from which the map can be crossed.
 
 The innermost loop runs along the angle axis: contiguous, without branches or index arithmetic, in single precision.
 """
@@ -19,34 +19,34 @@ from planner.planning.state_grid import Grid
 from planner.planning.transitions import lay_out_transitions
 from planner.table.cost import speed_cost
 
-# Infinity that survives a weight of 0, in single precision; what comes out of an interpolation with it is far above
-# ANY_COST, which in turn is far above what a path can cost in units of the greatest step cost.
+# Infinity that keeps its effect with a weight of 0, in single precision. An interpolation with it gives a result far
+# above ANY_COST, which is far above any possible cost of a path in units of the maximum step cost.
 UNREACHABLE = np.float32(1e30)
 ANY_COST = np.float32(1e12)
 NO_PAUSE = float(UNREACHABLE)
 ONE = np.float32(1.0)
 
-# A multiple of the vector length keeps the inner loop free of a scalar tail.
+# A multiple of the vector length avoids a scalar remainder of the inner loop.
 LANES = 8
 STEPS_AT_A_TIME = 3
 
 
 class BackwardStep(NamedTuple):
-    """What stays the same from one backward step to the next, and room to work in.
+    """Constants of all backward steps, and work arrays.
 
-    A row of the room holds one turn, continued periodically at both ends as far as a step goes.
+    A row of the work arrays has one turn, continued periodically at both ends as far as a step moves.
 
     Attributes:
         step_count: (n_speeds,) the steps from each speed.
         cost: (n_speeds, n_jumps) first term of Eq. (5).
         arrival_cost: (n_speeds,) second term of Eq. (5).
-        fraction: (n_speeds, n_jumps) where between two samples a step ends.
-        arrival_at: (n_speeds, n_jumps) place in `arrivals`, flattened, where a step from sample 0 ends.
-        barrier_at: (n_speeds, n_jumps) place in `barriers`, flattened, of what it sweeps.
+        fraction: (n_speeds, n_jumps) position between two samples at which a step ends.
+        arrival_at: (n_speeds, n_jumps) index in `arrivals`, flattened, at which a step from sample 0 ends.
+        barrier_at: (n_speeds, n_jumps) index in `barriers`, flattened, of the angles that it crosses.
         reach: samples of a row before the turn.
-        arrivals: (n_speeds, row length) what it costs to arrive at a speed and angle and to go on from there.
-        barriers: (n_lengths, row length) 0 where one may sweep so many cells upwards, infinite where not.
-        best: the least costs of leaving a speed, per angle.
+        arrivals: (n_speeds, row length) cost of arriving at a speed and angle and continuing from there.
+        barriers: (n_lengths, row length) 0 if the given number of cells upward may be crossed, infinity if not.
+        best: minimum cost of leaving a speed, per angle.
     """
 
     step_count: IndexArray
@@ -62,7 +62,7 @@ class BackwardStep(NamedTuple):
 
 
 def prepare_backward_step(terms: Terms, grid: Grid, unit: float) -> BackwardStep:
-    """Return what `step_back` needs on a grid, for costs in a unit."""
+    """Return the data for `step_back` on a grid, with costs in a unit."""
     steps = lay_out_transitions(terms, grid, unit)
     reach = int(max(np.abs(steps.shift).max(), np.abs(steps.sweep_start).max()))
     width = -(-grid.angle_count // LANES) * LANES
@@ -93,12 +93,13 @@ def step_back(
     """Write the cost-to-go of a column, given that of the next.
 
     Args:
-        backward: from `prepare_backward_step`; its room is overwritten.
+        backward: from `prepare_backward_step`; its work arrays are overwritten.
         later: (n_speeds, n_angles) cost-to-go of the next column.
         node_cost: (n_angles,) 1 - f_R there, in units.
-        sweep: (n_angles,) how many cells one may sweep upwards from each angle in between.
-        pause_price: units of cost for stopping the scan and going on at rest at any angle; NO_PAUSE rules that out.
-        earlier: (n_speeds, n_angles) receives the result.
+        sweep: (n_angles,) number of cells that may be crossed upward from each angle within the step.
+        pause_price: units of cost for stopping the scan and continuing from rest at any angle; NO_PAUSE excludes
+            pauses.
+        earlier: (n_speeds, n_angles) output.
     """
     arrivals, barriers, best = backward.arrivals, backward.barriers, backward.best
     _lay_out_arrivals(later, node_cost, backward.arrival_cost, backward.reach, arrivals)
@@ -117,7 +118,7 @@ def step_back(
 def _lay_out_arrivals(
     later: CostArray, node_cost: CostArray, arrival_cost: CostArray, reach: int, arrivals: CostArray
 ) -> None:
-    """Write what it costs to arrive in the next column and to go on from there."""
+    """Write the cost of arriving in the next column and continuing from there."""
     for j in range(len(arrival_cost)):
         row, onward, cost = arrivals[j], later[j], arrival_cost[j]
         turn = row[reach:]
@@ -128,7 +129,7 @@ def _lay_out_arrivals(
 
 @kernel
 def _lay_out_barriers(sweep: RunArray, reach: int, barriers: CostArray) -> None:
-    """Write, per length of the sweep and its first sample, 0 where it is allowed and infinity where it is not."""
+    """Write, for each length of the crossed range and its first sample, 0 if it is allowed and infinity if not."""
     for length in range(len(barriers)):
         row = barriers[length]
         turn = row[reach:]
@@ -139,7 +140,7 @@ def _lay_out_barriers(sweep: RunArray, reach: int, barriers: CostArray) -> None:
 
 @kernel
 def _continue_periodically(row: CostArray, start: int, period: int) -> None:
-    """Fill what lies before and after the one period that begins at `start`."""
+    """Fill the row before and after the period that begins at `start`."""
     for m in range(start):
         row[m] = row[m + period]
     for m in range(start + period, len(row)):
@@ -148,9 +149,9 @@ def _continue_periodically(row: CostArray, start: int, period: int) -> None:
 
 @kernel
 def _leave(speed: int, backward: BackwardStep, arrivals: CostArray, barriers: CostArray, best: CostArray) -> None:
-    """Lower `best`, the least cost of leaving a speed, per angle, to that of the best of its steps.
+    """Reduce `best`, the minimum cost of leaving a speed, per angle, to that of the best of its steps.
 
-    Three steps at a time share what it costs to enter the innermost loop.
+    Three steps at a time share the overhead of the innermost loop.
     """
     onward, swept = backward.arrival_at[speed], backward.barrier_at[speed]
     cost, fraction = backward.cost[speed], backward.fraction[speed]

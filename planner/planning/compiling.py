@@ -1,7 +1,7 @@
-"""The default planner's machine code, compiled in a second process while this one computes maps.
+"""Compile the default planner's machine code in a second process while this one computes maps.
 
-On a new machine, or after a change of a kernel, a plan waits for its kernels. Those of the map and those of the planner
-take about the same time, and numba compiles one after the other in a process.
+On a new machine, or after a change of a kernel, a plan has to wait for its kernels. Those of the map and those of the
+planner take about the same time, and numba compiles sequentially within a process.
 """
 
 import subprocess
@@ -27,11 +27,11 @@ from protocol.progress import ProgressOf
 
 @contextmanager
 def compiling_beside(planner: str, progress: ProgressOf) -> Iterator[Callable[[], None]]:
-    """Have the machine code of a planner compiled, if it is not kept yet, and give what waits for that."""
+    """Compile the machine code of a planner if it is not stored yet, and give the function that waits for it."""
     if planner != DEFAULT_PLANNER or is_kept(cost_to_go):
         yield lambda: None
         return
-    # What fails there is compiled here, where it is needed.
+    # After a failure in the second process, this process compiles when the code is needed.
     process = subprocess.Popen(  # noqa: S603  # this file
         own_program(__name__),
         stdin=subprocess.DEVNULL,
@@ -56,7 +56,10 @@ def compiling_beside(planner: str, progress: ProgressOf) -> Iterator[Callable[[]
 
 
 def compile_default_planner() -> None:
-    """Plan once on a map without obstacles, and judge the plan as a command does: types are those of any other scan."""
+    """Plan once on a map without obstacles, and check the plan as a command does.
+
+    The types are those of any other scan.
+    """
     scan, configuration = load_scan("cylinder"), Configuration.LEFTY_ABOVE_NOFLIP
     free = np.full((len(scan.path.T_WS), 36), 0.5)
     problem = scan_problem(scan, ConfigurationMap(free, metadata={"configuration": configuration.label}))

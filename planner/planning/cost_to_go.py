@@ -1,6 +1,6 @@
-"""The least cost from every state (column, speed, angle) to the last column, by backward dynamic programming.
+"""The minimum cost from every state (column, speed, angle) to the last column, by backward dynamic programming.
 
-A plan is found by following it forwards (`dynamic_programming.py`); one column of it follows from the next
+Following it forward gives a plan (`dynamic_programming.py`). Each column is computed from the next
 (`backward_step.py`).
 """
 
@@ -32,9 +32,9 @@ class CostToGo(NamedTuple):
     """The cost-to-go and its grid.
 
     Attributes:
-        grid: where it is sampled.
-        costs: (n + 1, n_speeds, n_angles), in units of `unit`; above ANY_COST where the path cannot be crossed.
-        unit: cost of one unit. It keeps any weights within single precision.
+        grid: its sampling points.
+        costs: (n + 1, n_speeds, n_angles), in units of `unit`; above ANY_COST if the path cannot be crossed.
+        unit: cost of one unit. It keeps all weights within single precision.
     """
 
     grid: Grid
@@ -43,18 +43,18 @@ class CostToGo(NamedTuple):
 
 
 def cost_to_go(problem: Problem, grid: Grid) -> CostToGo:
-    """Return the least cost from every state of the grid to the last column.
+    """Return the minimum cost from every state of the grid to the last column.
 
-    Memory is dominated by the result: 4 bytes a state.
+    The result dominates the memory: 4 bytes per state.
 
     Raises:
-        GridError: that would be more than MOST_STATES.
+        GridError: the result would exceed MOST_STATES.
     """
     states = grid.state_count(problem.map.location_count)
     if states > MOST_STATES:
         raise GridError(
-            f"the cost-to-go would have {states:,} states (locations x speeds x angles); allowed are {MOST_STATES:,}: "
-            "take fewer locations or angles, or limits that let the table reach its speed in fewer steps"
+            f"the cost-to-go would have {states:,} states (locations x speeds x angles); allowed are {MOST_STATES:,}; "
+            "reduce the number of locations or angles, or use limits with which full speed takes fewer steps"
         )
     unit = problem.greatest_step_cost
     backward = prepare_backward_step(problem.terms, grid, unit)
@@ -64,7 +64,7 @@ def cost_to_go(problem: Problem, grid: Grid) -> CostToGo:
 
 @kernel
 def cost_from(costs: CostArray, grid: Grid, column: int, speed: int, angle_deg: float) -> float:
-    """Return the cost-to-go at a speed of the grid and any angle, interpolated; infinite where there is no way on."""
+    """Return the interpolated cost-to-go at a speed of the grid and any angle; infinity if there is no continuation."""
     count = costs.shape[2]
     position = (angle_deg - grid.angle_origin_deg) * count / 360.0
     below, above = sample_at_or_below(position), sample_at_or_above(position)
@@ -77,7 +77,7 @@ def cost_from(costs: CostArray, grid: Grid, column: int, speed: int, angle_deg: 
 
 @kernel
 def cost_from_any_speed(costs: CostArray, grid: Grid, column: int, speed_deg_s: float, angle_deg: float) -> float:
-    """Return the cost-to-go, interpolated between two speeds of the grid too; infinite where either has no way on."""
+    """Return the cost-to-go, interpolated between two speeds too; infinity if either has no continuation."""
     position = min(max(speed_deg_s / grid.speed_step_deg_s + grid.half_count, 0.0), costs.shape[1] - 1.0)
     below, above = sample_at_or_below(position), sample_at_or_above(position)
     lower = cost_from(costs, grid, column, below, angle_deg)
@@ -89,11 +89,11 @@ def cost_from_any_speed(costs: CostArray, grid: Grid, column: int, speed_deg_s: 
 
 @kernel
 def lay_out_columns(terms: Terms, grid: Grid, unit: float) -> tuple[CostArray, RunArray]:
-    """Return 1 - f_R at every node (unreachable where forbidden), and how far one may sweep upwards in each step.
+    """Return 1 - f_R at every node (unreachable if forbidden), and how far upward each step may move.
 
     Returns:
-        The (n + 1, n_angles) costs in units, and the (n, n_angles) counts of cells that may be swept from a node: 0
-        where only the node itself is allowed, -1 where not even that.
+        The (n + 1, n_angles) costs in units, and the (n, n_angles) counts of cells that may be crossed from a node: 0
+        if only the node itself is allowed, -1 if not even that.
     """
     steps, angle_count = len(terms.values) - 1, grid.angle_count
     step_deg = 360.0 / angle_count

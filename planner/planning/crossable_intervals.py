@@ -1,8 +1,9 @@
-"""From which angles can the rest of the map be crossed? Exactly, without a grid of angles.
+"""Compute exactly, without a grid of angles, from which angles the rest of the map can be crossed.
 
-For a column and a speed these angles are a union of intervals: a step to another speed shifts those of the next column
-back by the angle that it moves, and a run of samples that are allowed in both columns clips them. Only the speeds are
-on a grid. It finds ways that no lattice has: close to the limits, or through gaps that a lattice meets at one speed.
+For a column and a speed, these angles are a union of intervals. A step to another speed shifts the intervals of the
+next column back by its travel. A run of samples that are allowed in both columns clips them. Only the speeds are on a
+grid. This finds paths that no lattice has: close to the limits, or through gaps that a lattice passes at only one
+speed.
 """
 
 from typing import NamedTuple
@@ -18,16 +19,16 @@ from planner.planning.problem import Problem, Terms
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import Motion, next_angle, swept_angles
 
-# Shares of what still lies on a sample: so much is a run longer, and so much an angle may lie outside an interval.
+# Tolerances in samples: a run is longer by the first, and an angle may be outside an interval by the second.
 LONGER = 0.2 * SAMPLE_TOLERANCE
 OUTSIDE = 0.4 * SAMPLE_TOLERANCE
 ROUNDING = 1e-9
 
-# 32 MB: speeds that split the angles into more are given up, and more speeds would take too long.
+# 32 MB: speeds that split the angles into more intervals are omitted, and more speeds would take too long.
 MOST_INTERVALS = 2_000_000
 MOST_SPEEDS = 1_000
 
-# Pairs of an interval and a run, about a second.
+# Maximum number of pairs of an interval and a run, about a second.
 MOST_WORK = 100_000_000
 
 
@@ -36,8 +37,8 @@ class Crossable(NamedTuple):
 
     Attributes:
         speeds_deg_s: (n_speeds,) ascending.
-        first: (n + 1, n_speeds) where the intervals of a column and speed begin.
-        interval_count: (n + 1, n_speeds) and how many there are.
+        first: (n + 1, n_speeds) index of the first interval of a column and speed.
+        interval_count: (n + 1, n_speeds) number of its intervals.
         lows: lower ends, in samples from 0 up to a turn.
         highs: upper ends.
     """
@@ -50,11 +51,12 @@ class Crossable(NamedTuple):
 
 
 def crossing_motion(problem: Problem, speeds_per_gain: int) -> Motion | None:
-    """Return a motion across the map from the problem's start, not a cheap one; None where these speeds have none.
+    """Return a motion across the map from the problem's start, not optimized; None if these speeds have none.
 
     Args:
-        problem: what is to be crossed.
-        speeds_per_gain: speeds within what the acceleration limit gains in a step; the limits and the start are others.
+        problem: the problem.
+        speeds_per_gain: number of speeds within the change that the acceleration limit allows in a step; limits and
+            start are added.
     """
     speeds_deg_s = speeds_of(problem, speeds_per_gain)
     if len(speeds_deg_s) > MOST_SPEEDS:
@@ -68,7 +70,7 @@ def crossing_motion(problem: Problem, speeds_per_gain: int) -> Motion | None:
 
 
 def speeds_of(problem: Problem, speeds_per_gain: int) -> FloatArray:
-    """Return the speeds to use: multiples of a part of what a step gains, both limits, and the start."""
+    """Return the speeds to use: multiples of a fraction of the change in one step, both limits, and the start."""
     limit, gain = problem.limits.speed_deg_s, problem.limits.acceleration_deg_s2 * problem.step_s
     step = min(gain, limit) / speeds_per_gain
     positive = np.arange(int(problem.attainable_speed_deg_s / step + ROUNDING) + 1) * step
@@ -78,7 +80,10 @@ def speeds_of(problem: Problem, speeds_per_gain: int) -> FloatArray:
 
 
 def _start(problem: Problem, crossable: Crossable) -> tuple[float, int] | None:
-    """Return a start from which the map can be crossed: where the angle is free, the middle of the widest interval."""
+    """Return a start from which the map can be crossed.
+
+    If the angle is free, it is the middle of the widest interval.
+    """
     turn, start_speed = float(problem.map.angle_count), problem.start_speed_deg_s
     best, widest = None, -1.0
     for s in range(len(crossable.speeds_deg_s)):
@@ -99,7 +104,7 @@ def _start(problem: Problem, crossable: Crossable) -> tuple[float, int] | None:
 
 @kernel
 def runs_of(runs: RunArray, step: int) -> tuple[FloatArray, FloatArray]:
-    """Return first and last sample of each run that is allowed throughout a step; (0, a turn) for a whole turn."""
+    """Return first and last sample of each run that is allowed during the whole step; (0, a turn) for a whole turn."""
     count: int = runs.shape[1]
     lows, highs = np.empty(count), np.empty(count)
     found = 0
@@ -114,7 +119,7 @@ def runs_of(runs: RunArray, step: int) -> tuple[FloatArray, FloatArray]:
 
 @kernel
 def crossable_intervals(terms: Terms, speeds_deg_s: FloatArray) -> Crossable:
-    """Return from which angles the rest can be crossed, per column and speed, with steps between the given speeds."""
+    """Return the angles from which the rest can be crossed, per column and speed, in steps between given speeds."""
     steps, speeds, turn = len(terms.values) - 1, len(speeds_deg_s), float(terms.values.shape[1])
     first, count = np.zeros((steps + 1, speeds), dtype=np.int64), np.zeros((steps + 1, speeds), dtype=np.int64)
     lows, highs, end = np.zeros(1024), np.full(1024, turn), 1
@@ -156,7 +161,7 @@ def _leave(
     """Return the crossable angles of a column at speed s, given `first` and `count` of the next column's intervals."""
     gain = terms.acceleration_limit_deg_s2 * terms.step_s * (1.0 + ROUNDING)
     is_near = np.abs(speeds_deg_s - speeds_deg_s[s]) <= gain
-    # Of disjoint intervals and disjoint runs, few pairs meet twice around the turn.
+    # For disjoint intervals and disjoint runs, few pairs overlap twice around the turn.
     room = 4 * (count * is_near).sum() * (len(run_lows) + 1)
     piece_lows, piece_highs = np.empty(room), np.empty(room)
     pieces = 0
@@ -191,7 +196,7 @@ def _step_back(
     piece_highs: FloatArray,
     pieces: int,
 ) -> int:
-    """Append the angles from which a step between two speeds leads into given intervals; return the new count."""
+    """Append the angles from which a step between two speeds ends in given intervals; return the new count."""
     turn = float(terms.values.shape[1])
     samples_per_deg = turn / 360.0
     acceleration = (later - speed) / terms.step_s
@@ -210,7 +215,7 @@ def _step_back(
             run_low, run_high = run_lows[r] - LONGER - lowest, run_highs[r] + LONGER - highest
             if run_low > run_high:
                 continue
-            # The copy of the run that is the first to end above `low`, and those after it that begin below `high`.
+            # The copy of the run that is the first to end above `low`, and the following ones that start below `high`.
             turned = turn * np.ceil((low - run_high) / turn)
             while run_low + turned <= low + length:
                 piece_low, piece_high = max(low, run_low + turned), min(low + length, run_high + turned)
@@ -223,7 +228,7 @@ def _step_back(
 
 @kernel
 def follow(terms: Terms, crossable: Crossable, angle_deg: float, speed: int) -> Motion:
-    """Return a motion across the map from a crossable state: of the steps that keep it so, the cheapest each time."""
+    """Return a motion across the map from a crossable state: at each step, the cheapest one that stays crossable."""
     steps, speeds_deg_s = len(terms.values) - 1, crossable.speeds_deg_s
     angles, speeds, accelerations = np.empty(steps + 1), np.empty(steps + 1), np.empty(steps)
     angles[0], speeds[0] = angle_deg, speeds_deg_s[speed]
@@ -243,7 +248,7 @@ def follow(terms: Terms, crossable: Crossable, angle_deg: float, speed: int) -> 
 
 @kernel
 def _cost(terms: Terms, crossable: Crossable, column: int, angle_deg: float, speed_deg_s: float, t: int) -> float:
-    """Return what the step from a state to speed t costs; infinite where it is not allowed or has no way on."""
+    """Return the cost of the step from a state to speed t; infinity if it is not allowed or has no continuation."""
     later = crossable.speeds_deg_s[t]
     turn = float(terms.values.shape[1])
     acceleration = (later - speed_deg_s) / terms.step_s

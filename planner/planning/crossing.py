@@ -1,9 +1,8 @@
-"""May the table go from one scan location to the next without meeting a forbidden region in between?
+"""Check whether the table can move from one scan location to the next without touching a forbidden region.
 
-No sub-steps are needed to tell. Anywhere strictly between two columns, all four samples around a point have a weight
-in the bilinear look-up. A step that sweeps the angles [lowest, highest] is therefore allowed, at each of its
-infinitely many sub-steps, exactly if in *both* columns every sample is allowed from the one at or below `lowest` to
-the one at or above `highest`.
+No sub-steps are needed. Strictly between two columns, all four samples around a point have a weight in the bilinear
+look-up. So a step over the angles [lowest, highest] is allowed, at each of its infinitely many sub-steps, exactly if
+every sample is allowed in *both* columns, from the one at or below `lowest` to the one at or above `highest`.
 """
 
 import numpy as np
@@ -19,14 +18,14 @@ RunArray = npt.NDArray[np.int32]
 
 @kernel
 def free_runs(allowed: BoolArray) -> RunArray:
-    """Count the consecutive samples, upwards in angle and around the turn, that are allowed in a column and the next.
+    """Count the consecutive samples, upward in angle and around the turn, that are allowed in a column and the next.
 
     Args:
         allowed: (n + 1, n_angles).
 
     Returns:
-        (n, n_angles): entry (k, i) is the length of the run that starts at sample i of the step from column k to
-        k + 1; 0 where i itself is forbidden; without bound (the greatest int32) where the whole turn is allowed.
+        (n, n_angles): entry (k, i) is the length of the run that starts at sample i of the step from column k to k + 1.
+        It is 0 if i itself is forbidden, and the maximum int32 if the whole turn is allowed.
     """
     steps, count = allowed.shape[0] - 1, allowed.shape[1]
     runs = np.zeros((steps, count), dtype=np.int32)
@@ -40,13 +39,13 @@ def free_runs(allowed: BoolArray) -> RunArray:
 
 
 def free_runs_down(allowed: BoolArray) -> RunArray:
-    """Count as `free_runs` does, but downwards in angle."""
+    """Count as `free_runs` does, but downward in angle."""
     return np.ascontiguousarray(free_runs(np.ascontiguousarray(allowed[:, ::-1]))[:, ::-1])
 
 
 @kernel
 def crossing_is_allowed(runs: RunArray, step: int, lowest_deg: float, highest_deg: float) -> bool:
-    """Tell whether the angles from `lowest_deg` to `highest_deg` are allowed all the way through one step."""
+    """Return whether the angles from `lowest_deg` to `highest_deg` are allowed during the whole step."""
     count = runs.shape[1]
     first = sample_at_or_below(lowest_deg * (count / 360.0))
     last = sample_at_or_above(highest_deg * (count / 360.0))
@@ -57,6 +56,6 @@ def crossing_is_allowed(runs: RunArray, step: int, lowest_deg: float, highest_de
 def step_is_allowed(
     runs: RunArray, step: int, angle_deg: float, speed_deg_s: float, acceleration_deg_s2: float, step_s: float
 ) -> bool:
-    """Tell whether the table's motion from column `step` to the next stays allowed, both columns included."""
+    """Return whether the table's motion from column `step` to the next is allowed, including both columns."""
     lowest, highest = swept_angles(angle_deg, speed_deg_s, acceleration_deg_s2, step_s)
     return crossing_is_allowed(runs, step, lowest, highest)

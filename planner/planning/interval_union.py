@@ -1,7 +1,7 @@
 """Unions of closed intervals on a circle.
 
-An interval is (low, high), low within 0 .. turn, high >= low; one that reaches beyond the turn goes on at 0. The
-whole circle is (0, turn). A union is kept as disjoint intervals, ascending.
+An interval is (low, high) with low in 0 .. turn and high >= low; beyond the turn it continues at 0. The whole circle is
+(0, turn). A union is stored as disjoint intervals in ascending order.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from planner.kernel import kernel
 
 @kernel
 def unite(lows: FloatArray, highs: FloatArray, count: int, turn: float) -> int:
-    """Replace the first `count` intervals by their union, in place; return how many intervals that has."""
+    """Replace the first `count` intervals by their union, in place; return the number of intervals of the union."""
     if count == 0:
         return 0
     order = np.argsort(lows[:count])
@@ -40,7 +40,7 @@ def unite(lows: FloatArray, highs: FloatArray, count: int, turn: float) -> int:
 
 @kernel
 def contains(lows: FloatArray, highs: FloatArray, position: float, turn: float, tolerance: float) -> bool:
-    """Tell whether a position, within 0 .. turn, lies in one of the intervals."""
+    """Return whether a position in 0 .. turn is in one of the intervals."""
     for i in range(len(lows)):
         if lows[i] - tolerance <= position <= highs[i] + tolerance or position + turn <= highs[i] + tolerance:
             return True

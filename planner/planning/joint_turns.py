@@ -1,9 +1,9 @@
-"""The turns of an arm's joints, and what a move between two columns does to them.
+"""The turns of an arm's joints, and their change in a move between two columns.
 
-The map has no memory, but an arm has: joints 4 and 6 wind up along a path, and joint speeds limit what may happen
-between two columns. A move changes each joint by the shorter way round, so it also changes the turn that the joint is
-on. It is barred where it takes a joint faster than its maximum speed, where it ends beyond a joint limit, and where the
-shorter ways of joints 4 and 6 are not that of the flange.
+The map has no memory, but an arm has: joints 4 and 6 wind up along a path, and joint speeds limit the moves between two
+columns. A move changes each joint in the shorter direction, so it also changes the turn of the joint. It is barred if
+it exceeds a joint's maximum speed, if it ends beyond a joint limit, or if the shorter directions of joints 4 and 6 are
+not the shorter direction of the flange.
 """
 
 from itertools import product
@@ -19,12 +19,12 @@ from planner.kinematics.wrist_turn import turns_the_long_way
 
 JOINTS = 6
 TURN = 2.0 * np.pi
-# The way round is not certain for a joint that moves by half a turn: rounding would decide.
+# The direction is not certain for a joint that moves by half a turn: rounding would decide.
 _MOST_RAD = np.pi - 1e-6
 
 _CHANGES = np.array(tuple(product((-1, 0, 1), repeat=JOINTS)))
 
-# Codes below that of the last joint's speed, and how many kinds of bars there are.
+# Codes below that of the last joint's speed, and the number of kinds of bars.
 WRIST_BAR = -1 - JOINTS
 BARS = 2 * JOINTS + 1
 
@@ -32,7 +32,7 @@ TurnsArray = npt.NDArray[np.int16]
 
 
 class Margin(NamedTuple):
-    """How far a motion stays from the limits of the joints.
+    """Margins of a motion from the limits of the joints.
 
     Attributes:
         limit_deg: distance from each joint limit.
@@ -44,13 +44,13 @@ class Margin(NamedTuple):
 
 
 class Turns(NamedTuple):
-    """The combinations of turns that a search keeps apart, as the kernels take them.
+    """The combinations of turns that a search distinguishes, as arrays for the kernels.
 
-    A change of turns is a code: per joint -1, 0 or 1 turns, plus 1, as digits to the base 3.
+    A change of turns has a code: per joint -1, 0 or 1 turns, plus 1, as digits in base 3.
 
     Attributes:
         turns: (n_turns, 6) whole turns added to each joint.
-        after: (n_turns, 3**6) the combination after a change of turns; -1 where there is none.
+        after: (n_turns, 3**6) the combination after a change of turns; -1 if there is none.
         lower_rad: (6,) lower joint limits.
         upper_rad: (6,) upper joint limits.
         most_rad: (6,) maximum moves in a step.
@@ -64,9 +64,9 @@ class Turns(NamedTuple):
 
 
 def lay_out_turns(arm: Arm, joints: FloatArray, step_s: float, margin: Margin) -> Turns:
-    """Return the combinations of turns on which joints (..., 6), in radians, can be within their limits.
+    """Return the combinations of turns for which joints (..., 6), in radians, can be within their limits.
 
-    There is none where a joint is beyond its limits everywhere.
+    There is none if a joint is beyond its limits everywhere.
     """
     lower, upper = arm.limits
     keep = np.minimum(np.radians(margin.limit_deg), 0.5 * (upper - lower))
@@ -92,7 +92,7 @@ def lay_out_turns(arm: Arm, joints: FloatArray, step_s: float, margin: Margin) -
 def turn_change(turns: Turns, before: FloatArray, after: FloatArray) -> int:
     """Return the code of the change of turns from joints (6,) to joints (6,).
 
-    -1 - j where joint j is too fast, WRIST_BAR where the flange would go the longer way round.
+    -1 - j if joint j is too fast, WRIST_BAR if the flange would take the longer direction.
     """
     code, move_4, move_6 = 0, 0.0, 0.0
     for j in range(JOINTS):
@@ -108,7 +108,7 @@ def turn_change(turns: Turns, before: FloatArray, after: FloatArray) -> int:
 
 @kernel
 def is_within_limits(turns: Turns, combination: int, joints: FloatArray) -> bool:
-    """Return whether joints (6,) on a combination of turns are within their limits."""
+    """Return whether joints (6,) with a combination of turns are within their limits."""
     for j in range(JOINTS):
         angle = joints[j] + TURN * turns.turns[combination, j]
         if not turns.lower_rad[j] <= angle <= turns.upper_rad[j]:
@@ -118,7 +118,7 @@ def is_within_limits(turns: Turns, combination: int, joints: FloatArray) -> bool
 
 @kernel
 def count_bar(turns: Turns, combination: int, before: FloatArray, after: FloatArray, bars: IndexArray) -> None:
-    """Count the bars (BARS,) of a move from joints (6,) to joints (6,): six limits, six speeds, the flange's way."""
+    """Count the bars (BARS,) of a move between joints (6,): six limits, six speeds, the flange's direction."""
     code = turn_change(turns, before, after)
     if code < 0:
         bars[JOINTS - 1 - code] += 1

@@ -1,12 +1,12 @@
 """A lattice of angles and speeds around a reference motion, on which every step ends exactly on a node.
 
 Under Eq. (3) and (4) a motion is its reference plus another motion. Count angles from the reference in nodes of h
-degrees, and speeds from it in units of 2 h / dt. A step from speed i to speed j then leads from node p to node
-p + i + j: nothing is interpolated, and a path of the lattice *is* a motion.
+degrees, and speeds from it in units of 2 h / dt. A step from speed i to speed j then moves from node p to node p + i +
+j: nothing is interpolated, and a path of the lattice *is* a motion.
 
-The parity of p + i never changes. So only the nodes p = 2 q + i are kept, and a step leads from q to q + i, whatever
-speed it ends with. Standing still, the table is on every second node: with an even number of nodes a sample of the map
-that can be any sample.
+The parity of p + i never changes. So only the nodes p = 2 q + i are stored. A step moves from q to q + i for any final
+speed. At rest, the table is on every second node: with an even number of nodes per sample of the map, it can be on any
+sample.
 """
 
 from typing import NamedTuple
@@ -20,11 +20,11 @@ from planner.planning.problem import Terms
 from planner.table.cost import value_cost
 from planner.table.motion import Motion
 
-# Half of the tolerance within which an angle lies on a sample: the other half is left to rounding.
+# Half of the tolerance within which an angle is on a sample: the other half is for rounding.
 ON_A_SAMPLE = 0.5 * SAMPLE_TOLERANCE
 
-# Infinity that survives additions in single precision; ANY_COST is far above what a path can cost, in units of the
-# greatest cost of a step.
+# Infinity that keeps its effect in additions in single precision; ANY_COST is far above any possible cost of a path, in
+# units of the maximum cost of a step.
 UNREACHABLE = np.float32(1e30)
 ANY_COST = np.float32(1e12)
 
@@ -36,12 +36,12 @@ class Lattice(NamedTuple):
     """States (column, speed i, q) around a reference motion.
 
     Attributes:
-        reference: what angles and speeds are counted from. It need not avoid forbidden regions.
+        reference: origin of angles and speeds. It may cross forbidden regions.
         node_deg: h, the distance of two nodes.
         half_count: i runs from -half_count to half_count.
         first_q: the first q.
-        q_count: how many q there are.
-        is_closed: whether q goes around the turn in `q_count` steps; if not, this is a tube around the reference.
+        q_count: number of values of q.
+        is_closed: whether q covers the turn in `q_count` steps; if not, the lattice is a tube around the reference.
     """
 
     reference: Motion
@@ -53,19 +53,20 @@ class Lattice(NamedTuple):
 
 
 class StepRows(NamedTuple):
-    """What is known of each node p before the step from column k to the next.
+    """Data of each node p before the step from column k to the next.
 
-    The nodes are in two rows, even and odd, so that p = 2 q + i is found in row i & 1 at place
-    q + (i >> 1) - lattice.first_q + margin, and neighboring q are neighbors in memory.
+    The nodes are in two rows, even and odd. So p = 2 q + i is in row i & 1 at index q + (i >> 1) - lattice.first_q +
+    margin, and neighboring q are neighbors in memory.
 
     Attributes:
-        room_above: greatest change i + j of a step that stays allowed upwards; far below any where p is forbidden.
-        room_below: greatest -(i + j), downwards.
-        turn_above: how far above p the table may turn back, in nodes.
-        turn_below: how far below.
+        room_above: maximum change i + j of a step that is allowed upward; far below any possible value if p is
+            forbidden.
+        room_below: maximum of -(i + j), downward.
+        turn_above: maximum distance above p at which the table may reverse, in nodes.
+        turn_below: the same below.
         value_cost: first term of Eq. (6) in units, at p as a node of column k + 1.
         sample: the sample at or below p.
-        fraction: how far p lies above it, in samples; 0 on it.
+        fraction: distance of p above it, in samples; 0 on it.
     """
 
     room_above: CostArray
@@ -96,19 +97,19 @@ def motion_along(lattice: Lattice, q: int, speeds: IndexArray, step_s: float) ->
 
 @kernel
 def cost_unit(terms: Terms) -> float:
-    """Return the greatest cost of a step: costs are counted in it, so that any weights fit into single precision."""
+    """Return the maximum cost of a step, the unit of costs: so all weights fit into single precision."""
     return 0.5 * terms.pause_cost
 
 
 @kernel
 def margin(lattice: Lattice) -> int:
-    """Return how many places a row has before `first`, and after the last q: as far as a step leads."""
+    """Return the number of entries of a row before `first`, and after the last q: as far as a step moves."""
     return lattice.half_count + 1
 
 
 @kernel
 def make_rows(lattice: Lattice) -> StepRows:
-    """Return room for what `lay_out_step` writes."""
+    """Return the work arrays that `lay_out_step` fills."""
     shape = (2, lattice.q_count + 2 * margin(lattice))
     return StepRows(
         np.empty(shape, dtype=np.float32),
@@ -123,9 +124,9 @@ def make_rows(lattice: Lattice) -> StepRows:
 
 @kernel
 def lay_out_step(terms: Terms, lattice: Lattice, column: int, rows: StepRows) -> None:
-    """Write what the step from `column` to the next needs to know of its nodes.
+    """Write the data of the nodes for the step from `column` to the next.
 
-    Columns must come from the last to the first: the nodes' samples are kept from one to the next.
+    Columns must be processed from the last to the first: the samples of the nodes are kept from one to the next.
     """
     angles_deg, samples_per_deg = lattice.reference.angles_deg, terms.values.shape[1] / 360.0
     nodes_per_sample = 1.0 / (samples_per_deg * lattice.node_deg)
@@ -150,7 +151,7 @@ def lay_out_step(terms: Terms, lattice: Lattice, column: int, rows: StepRows) ->
 
 @kernel
 def _place_nodes(lattice: Lattice, origin: float, samples_per_deg: float, sample_count: int, rows: StepRows) -> None:
-    """Write at or above which sample each node lies, when the reference lies at `origin` (in samples)."""
+    """Write the sample at or below each node, with the reference at `origin` (in samples)."""
     for parity in range(2):
         for place in range(rows.sample.shape[1]):
             node = 2 * (place + lattice.first_q - margin(lattice)) + parity
@@ -163,7 +164,7 @@ def _place_nodes(lattice: Lattice, origin: float, samples_per_deg: float, sample
 
 @kernel
 def _lay_out_values(terms: Terms, column: int, rows: StepRows) -> None:
-    """Write what the nodes cost in a column: the first term of Eq. (6), as `column_value` has it."""
+    """Write the cost of the nodes in a column: the first term of Eq. (6), as in `column_value`."""
     values, unit, count = terms.values[column], cost_unit(terms), terms.values.shape[1]
     for parity in range(2):
         for place in range(rows.value_cost.shape[1]):
@@ -176,6 +177,6 @@ def _lay_out_values(terms: Terms, column: int, rows: StepRows) -> None:
 
 @kernel
 def rounded_up(number: float) -> np.float32:
-    """Return the least number in single precision that is not below a number."""
+    """Return the smallest single-precision number that is not below a number."""
     single = np.float32(number)
     return single if float(single) >= number else np.nextafter(single, np.float32(np.inf))

@@ -1,4 +1,4 @@
-"""Which lattice to search: fine enough for the limits, small enough for the time there is."""
+"""Choose a lattice that is fine enough for the limits and small enough for the available time."""
 
 import math
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from planner.table.motion import Limits, Motion
 # A rounding error below this does not lose a speed.
 ROUNDING = 1e-9
 
-# Share of the greatest speed that a speed of the lattice must reach: nearly all of it, or all of it.
+# Share of the maximum speed that a speed of the lattice must reach: nearly all of it, or all of it.
 NEARLY, EXACTLY = 0.97, 1.0 - ROUNDING
 
 # 200 MB.
@@ -21,18 +21,20 @@ MOST_STATES = 50_000_000
 def turn_lattice(
     problem: Problem, speed_count: int, work: int, reference: Motion | None = None, share: float = NEARLY
 ) -> Lattice | None:
-    """Return the coarsest lattice around the turn with at least so many speeds each way; None where all are too large.
+    """Return the coarsest lattice around the turn with at least the given number of speeds in each direction.
 
-    Its nodes at rest are the samples of the map, a multiple of them, or, where samples are closer than needed, every
-    second, third .. sample. The acceleration limit lies at least two speeds away, or one where two are too many
-    for `work`.
+    The result is None if all are too large.
+
+    Its nodes at rest are the samples of the map or a multiple of them. If samples are closer than needed, they are
+    every second, third .. sample. The acceleration limit is at least two speeds away, or one if two are too many for
+    `work`.
 
     Args:
-        problem: what is to be crossed.
-        speed_count: speeds each way, at least.
-        work: steps per column, at most.
-        reference: motion to lay the lattice around; without one, that of `reference_motion`.
-        share: of the greatest speed that can occur, at least so much is a speed.
+        problem: the problem.
+        speed_count: minimum number of speeds in each direction.
+        work: maximum number of steps per column.
+        reference: motion at the center of the lattice; by default, that of `reference_motion`.
+        share: minimum share of the maximum possible speed that is a speed of the lattice.
     """
     motion = reference_motion(problem) if reference is None else reference
     for least_reach in (2, 1):
@@ -52,13 +54,13 @@ def turn_lattice(
 
 
 def with_limits_rounded_up(lattice: Lattice, problem: Problem) -> Lattice:
-    """Return the lattice with one speed more each way where its last one is below the greatest that can occur."""
+    """Return the lattice with one more speed in each direction if its last one is below the maximum possible speed."""
     unit_deg_s = speed_unit(lattice, problem.step_s)
     return lattice._replace(half_count=math.ceil(problem.attainable_speed_deg_s / unit_deg_s - ROUNDING))
 
 
 def limits_rounded_up(lattice: Lattice, problem: Problem) -> Limits:
-    """Return the limits, rounded up to what steps of the lattice do."""
+    """Return the limits, rounded up to steps of the lattice."""
     unit_deg_s, limits = speed_unit(lattice, problem.step_s), problem.limits
     return Limits(
         unit_deg_s * math.ceil(limits.speed_deg_s / unit_deg_s - ROUNDING),
@@ -67,6 +69,6 @@ def limits_rounded_up(lattice: Lattice, problem: Problem) -> Limits:
 
 
 def _rests_per_turn(sample_count: int) -> Iterator[int]:
-    """Yield how many angles of rest a turn may have, ascending: a part of the samples, all, or a multiple."""
+    """Yield the possible numbers of rest angles per turn, ascending: a fraction of the samples, all, or a multiple."""
     yield from (count for count in range(1, sample_count) if sample_count % count == 0)
     yield from (sample_count * multiple for multiple in range(1, 10_000))

@@ -1,6 +1,6 @@
 """The cost-to-go of a lattice, by backward dynamic programming (Bellman's equation).
 
-The innermost loops run along q: contiguous, without branches, in single precision.
+The innermost loops are along q: contiguous, without branches, in single precision.
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ from planner.planning.lattice import (
 from planner.planning.problem import Terms
 from planner.table.cost import acceleration_cost, speed_cost
 
-# What rounding may add to a limit (relative), and take from a turn (in nodes).
+# Rounding tolerances: added to a limit (relative), and subtracted from a reversal distance (in nodes).
 ROUNDING = 1e-12
 TURN_ROUNDING = 1e-10
 
@@ -32,10 +32,10 @@ STEPS_AT_A_TIME = 3
 
 @kernel
 def cost_to_go(terms: Terms, lattice: Lattice) -> CostArray:
-    """Return the least cost from every state to the last column: (n + 1, 2 half_count + 1, q_count).
+    """Return the minimum cost from every state to the last column: (n + 1, 2 half_count + 1, q_count).
 
-    In units of the greatest cost of a step, less a constant of the column: the least of it is 0, which keeps single
-    precision fine. UNREACHABLE where there is no way.
+    The unit is the maximum cost of a step. A constant per column is subtracted: its minimum is 0, which keeps single
+    precision fine. UNREACHABLE if there is no path.
     """
     steps, speeds, count = len(terms.values) - 1, 2 * lattice.half_count + 1, lattice.q_count
     costs = np.zeros((steps + 1, speeds, count), dtype=np.float32)
@@ -55,7 +55,7 @@ def cost_to_go(terms: Terms, lattice: Lattice) -> CostArray:
 
 @kernel
 def _subtract_least(costs: CostArray, least: CostArray) -> None:
-    """Make the least of all costs 0, and what is above ANY_COST UNREACHABLE; `least` is room for one row."""
+    """Make the minimum of all costs 0, and costs above ANY_COST UNREACHABLE; `least` is a work array for one row."""
     least[:] = UNREACHABLE
     for s in range(len(costs)):
         for m in range(len(least)):
@@ -72,7 +72,7 @@ def _subtract_least(costs: CostArray, least: CostArray) -> None:
 def _lay_out_arrivals(
     terms: Terms, lattice: Lattice, column: int, rows: StepRows, onward: CostArray, arrivals: CostArray
 ) -> None:
-    """Write what it costs to arrive in a column, at each speed and q, and to go on from there."""
+    """Write the cost of arriving in a column, at each speed and q, and continuing from there."""
     start, count, half = margin(lattice), lattice.q_count, lattice.half_count
     for s in range(2 * half + 1):
         j = s - half
@@ -88,7 +88,7 @@ def _lay_out_arrivals(
 
 @kernel
 def _lay_out_step_costs(terms: Terms, lattice: Lattice, column: int, step_costs: CostArray) -> None:
-    """Write the first term of Eq. (5) of the steps that change the speed by -2 half_count .. 2 half_count, in units."""
+    """Write the first term of Eq. (5) for steps that change the speed by -2 half_count .. 2 half_count, in units."""
     for a in range(len(step_costs)):
         added = (a - 2 * lattice.half_count) * speed_unit(lattice, terms.step_s) / terms.step_s
         acceleration = lattice.reference.accelerations_deg_s2[column] + added
@@ -97,7 +97,7 @@ def _lay_out_step_costs(terms: Terms, lattice: Lattice, column: int, step_costs:
 
 @kernel
 def steps_from(terms: Terms, lattice: Lattice, column: int, i: int) -> tuple[int, int]:
-    """Return the first and the last speed j that a step from speed i of a column may end with; none if in reverse."""
+    """Return the first and the last speed j at the end of a step from speed i of a column; in reverse order if none."""
     unit = speed_unit(lattice, terms.step_s)
     now, later = lattice.reference.speeds_deg_s[column], lattice.reference.speeds_deg_s[column + 1]
     if abs(now + i * unit) > terms.speed_limit_deg_s * (1.0 + ROUNDING):
@@ -122,7 +122,7 @@ def _leave(
     step_costs: CostArray,
     best: CostArray,
 ) -> None:
-    """Lower `best`, per q, to the least cost of leaving speed i of a column."""
+    """Reduce `best`, per q, to the minimum cost of leaving speed i of a column."""
     unit, half, row_length = speed_unit(lattice, terms.step_s), lattice.half_count, arrivals.shape[1]
     speed, later = lattice.reference.speeds_deg_s[column] + i * unit, lattice.reference.speeds_deg_s[column + 1]
     first, last = steps_from(terms, lattice, column, i)
@@ -163,19 +163,19 @@ def _lower(
     room: CostArray,
     need: np.float32,
 ) -> None:
-    """Lower `best` by up to three steps that all move one way: they share what it costs to enter the innermost loop.
+    """Reduce `best` by up to three steps that all move in one direction: they share the overhead of the innermost loop.
 
     Args:
         best: per q.
-        onward: what it costs to arrive, flattened.
-        place: where in it the first step leads from q = first_q; the next ones lead `stride` further.
-        stride: to the next speed.
+        onward: cost of arriving and continuing, flattened.
+        place: index of the end of the first step from q = first_q; the next ones are `stride` further.
+        stride: distance to the next speed.
         step_costs: by change of speed.
-        cost_place: that of the first step; the next one is one place further up or down.
-        way: 1 upwards, -1 downwards.
+        cost_place: index for the first step; the next one is one index up or down.
+        way: 1 upward, -1 downward.
         more: further steps after the first, up to two.
-        room: per q.
-        need: room that the first step needs; each further one needs one node more.
+        room: available nodes per q.
+        need: nodes that the first step needs; each further one needs one node more.
     """
     b, c = min(1, more), min(2, more)
     row_a, row_b, row_c = onward[place:], onward[place + b * stride :], onward[place + c * stride :]
@@ -199,7 +199,7 @@ def _lower_turning(
     turn_room: CostArray,
     turn: np.float32,
 ) -> None:
-    """Lower `best` by a step that turns back on its way."""
+    """Reduce `best` by a step that reverses within the step."""
     for m in range(len(best)):
         lacking = max(max(need - room[m], turn - turn_room[m]), ZERO)  # noqa: PLW3301 - this form is vectorized
         best[m] = min(best[m], onward[m] + cost + UNREACHABLE * lacking)

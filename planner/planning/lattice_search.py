@@ -1,4 +1,4 @@
-"""The best path through a lattice: follow its cost-to-go (`lattice_cost_to_go.py`) forwards."""
+"""The best path through a lattice: follow its cost-to-go (`lattice_cost_to_go.py`) forward."""
 
 import numpy as np
 
@@ -14,12 +14,12 @@ from planner.table.motion import Limits, Motion
 
 
 def best_motion(problem: Problem, lattice: Lattice, limits: Limits | None = None) -> Motion | None:
-    """Return the best motion of a lattice from the problem's start; None where it has none.
+    """Return the best motion of a lattice from the problem's start; None if it has none.
 
     Args:
-        problem: what is to be crossed.
-        lattice: where to search; its reference has the problem's start, where that is given.
-        limits: other limits than the problem's.
+        problem: the problem.
+        lattice: the lattice; its reference has the problem's start, if that is given.
+        limits: limits that replace the problem's.
     """
     terms = problem.terms
     if limits is not None:
@@ -36,7 +36,7 @@ def best_motion(problem: Problem, lattice: Lattice, limits: Limits | None = None
 
 @kernel
 def _best_start(costs: CostArray, lattice: Lattice, angle_is_free: bool, speed_is_free: bool) -> tuple[int, int]:
-    """Return q and i of the best of the states that are a start: node 0 where the angle is given, speed 0 likewise."""
+    """Return q and i of the best start state: node 0 if the angle is given, speed 0 if the speed is given."""
     best_q, best_i, least = 0, 0, UNREACHABLE
     for s in range(len(costs)):
         i = s - lattice.half_count
@@ -52,7 +52,7 @@ def _best_start(costs: CostArray, lattice: Lattice, angle_is_free: bool, speed_i
 
 @kernel
 def _follow(terms: Terms, lattice: Lattice, costs: CostArray, q: int, i: int) -> IndexArray:
-    """Return the speeds of the best path from a state of column 0; fewer where no step goes on."""
+    """Return the speeds of the best path from a state of column 0; fewer if no step continues."""
     speeds = np.empty(len(costs), dtype=np.int64)
     speeds[0] = i
     for k in range(len(costs) - 1):
@@ -65,7 +65,7 @@ def _follow(terms: Terms, lattice: Lattice, costs: CostArray, q: int, i: int) ->
 
 @kernel
 def _best_step(terms: Terms, lattice: Lattice, costs: CostArray, column: int, q: int, i: int) -> int:
-    """Return the speed j at the end of the best step from a state; one beyond the last where there is none."""
+    """Return the speed j at the end of the best step from a state; one beyond the last if there is none."""
     reference, unit = lattice.reference, speed_unit(lattice, terms.step_s)
     angle = reference.angles_deg[column] + (2 * q + i) * lattice.node_deg
     speed = reference.speeds_deg_s[column] + i * unit

@@ -1,4 +1,4 @@
-"""What a planner answers: a `Plan`, or `NoPlan` with the reason."""
+"""The result of a planner: a `Plan`, or `NoPlan` with the reason."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ from planner.table.motion import Motion
 class Pause(NamedTuple):
     """The scan stops: retract the probe, turn the table from rest to rest, approach again.
 
-    It lies between location `step` and `step + 1`; the plan goes on at rest at `to_angle_deg`.
+    It is between location `step` and `step + 1`; the plan continues from rest at `to_angle_deg`.
     """
 
     step: int
@@ -35,12 +35,12 @@ class Wait(NamedTuple):
 
 
 class Infeasibility(Enum):
-    """Why there is no plan."""
+    """The reason why there is no plan."""
 
     BLOCKED_LOCATION = "a scan location has no allowed table angle"
     START_FORBIDDEN = "the start is in a forbidden region"
     UNREACHABLE = "no motion within the limits avoids the forbidden regions"
-    """That is proved."""
+    """This is proved."""
     NOT_FOUND = "none found: neither a motion that avoids the forbidden regions, nor a proof that there is none"
     ARM = "no motion was found that the arm can follow"
 
@@ -50,10 +50,10 @@ class NoPlan:
     """An expected failure.
 
     Attributes:
-        planner: the planner's name.
-        infeasibility: the kind of failure.
-        location: the scan location at which it shows, where there is one.
-        joint: the limit of the arm at which it shows, where there is one.
+        planner: name of the planner.
+        infeasibility: kind of the failure.
+        location: the scan location of the failure, if there is one.
+        joint: the joint limit of the failure, if there is one.
     """
 
     planner: str
@@ -71,13 +71,13 @@ class NoPlan:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The table's motion along a scan path.
+    """The motion of the table along a scan path.
 
-    Eq. (3) and (4) hold exactly (to rounding) in every step but those of `pauses`, where the table comes to rest.
+    Eq. (3) and (4) are satisfied exactly (to rounding) in every step except those of `pauses`, where the table stops.
 
     Attributes:
-        planner: the planner's name.
-        configuration: name of the arm configuration, "" where the map has none.
+        planner: name of the planner.
+        configuration: name of the arm configuration, "" if the map has none.
         step_s: time of one step.
         angles_deg: (n + 1,) unwrapped table angle at each location.
         speeds_deg_s: (n + 1,) speed at each location.
@@ -111,7 +111,7 @@ def path_cost(
     accelerations_deg_s2: FloatArray,
     pauses: Sequence[Pause] = (),
 ) -> PathCost:
-    """Return Eq. (7) of a motion; each paused step costs C_pen in place of the terms of Eq. (5)."""
+    """Return Eq. (7) of a motion; each paused step costs C_pen instead of the terms of Eq. (5)."""
     terms = problem.terms
     moving = np.ones(problem.step_count, dtype=np.bool_)
     moving[[pause.step for pause in pauses]] = False
@@ -157,7 +157,7 @@ def make_plan(
 
 
 def obvious_infeasibility(problem: Problem, planner: str) -> NoPlan | None:
-    """Return why nobody can cross the map, where one look at its columns tells."""
+    """Return why the map cannot be crossed, if its columns alone show this."""
     blocked = problem.map.blocked_locations
     if blocked:
         return NoPlan(planner, Infeasibility.BLOCKED_LOCATION, blocked[0])
@@ -173,7 +173,7 @@ def motion_of(plan: Plan) -> Motion:
 
 
 def greedy_start(problem: Problem) -> tuple[float, float]:
-    """Return the start of a planner that cannot weigh starts: where free, the brightest angle, at rest."""
+    """Return the start for a planner that does not compare starts: if free, the angle with maximum value, at rest."""
     angle = problem.start_angle_deg
     if angle is None:
         angle = float(problem.map.angles_deg[np.argmax(problem.map.values[0])])

@@ -1,4 +1,4 @@
-"""Does a plan, whoever made it, hold what a plan must: the right shapes, and Eq. (3) and (4) in each step?"""
+"""Check any plan for correct shapes, and for Eq. (3) and (4) in each step."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ _ROUNDING = 1e-6
 
 
 def contradiction(plan: Plan) -> str | None:
-    """Return what in a plan contradicts its own pauses and equations, or None.
+    """Return the first inconsistency of a plan with its own pauses and equations, or None.
 
     Args:
         plan: a plan of finite numbers, with one angle and one speed more than accelerations.
@@ -34,7 +34,7 @@ def contradiction(plan: Plan) -> str | None:
 
 
 def plan_fault(problem: Problem, plan: Plan) -> str | None:
-    """Return why a plan does not answer a problem, or None; whether it can be carried out is for `verify` to say."""
+    """Return why a plan is not a result for a problem, or None; `verify` checks whether it can be executed."""
     n = problem.step_count
     arrays = (
         ("angles_deg", plan.angles_deg, n + 1),
@@ -51,5 +51,5 @@ def plan_fault(problem: Problem, plan: Plan) -> str | None:
     starts = (plan.angles_deg[0], problem.start_angle_deg), (plan.speeds_deg_s[0], problem.start_speed_deg_s)
     for name, (is_now, asked) in zip(("angle", "speed"), starts, strict=True):
         if asked is not None and abs(is_now - asked) > _ROUNDING:
-            return f"the start {name} is {is_now:g}; the problem asks for {asked:g}"
+            return f"the start {name} is {is_now:g}; the problem requires {asked:g}"
     return contradiction(plan)

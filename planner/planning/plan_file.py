@@ -1,4 +1,4 @@
-"""A plan on disk: one JSON file with everything needed to run it. The same plan gives the same bytes."""
+"""A plan on disk: one JSON file with everything needed to execute it. The same plan gives the same bytes."""
 
 import json
 from dataclasses import asdict, fields
@@ -56,11 +56,11 @@ class StoredPlan(NamedTuple):
 
 
 def plan_document(scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -> dict[str, Any]:
-    """Return a plan with its scan, its limits and where it comes from, as JSON can hold it.
+    """Return a plan with its scan, its limits and its provenance, as JSON values.
 
-    Angles are degrees, lengths mm, times s; `locations` holds the probe's poses in the workpiece frame, row by row.
-    `start_turns` and the margins of the joints have one number a joint (see `ArmMotion`). `arm_fault` says why the arm
-    cannot follow; such a plan is there to be looked at.
+    Angles are in degrees, lengths in mm, times in s; `locations` contains the probe's poses in the workpiece frame, row
+    by row. `start_turns` and the margins of the joints have one number per joint (see `ArmMotion`). `arm_fault` states
+    why the arm cannot follow; such a plan is only for inspection.
     """
     checked = verify(problem, plan)
     cell = scan.cell
@@ -104,15 +104,15 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -
 
 
 def save_plan(file: Path, document: dict[str, Any]) -> None:
-    """Write a plan to `file`, which appears when it is whole."""
+    """Write a plan to `file`, which appears when it is complete."""
     write_whole(file, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
 
 def load_plan(file: Path) -> StoredPlan:
-    """Return what a file holds.
+    """Return the table's motion from a file.
 
     Raises:
-        PlanFileError: the file cannot be read, or is no plan of this format, or is damaged.
+        PlanFileError: the file cannot be read, or is not a plan of this format.
     """
     try:
         document = read_json(file)
@@ -176,12 +176,12 @@ def _planned_arm(document: dict[str, Any]) -> PlannedArm:
 
 
 def _rounded(array: FloatArray) -> list[Any]:
-    """Return nested lists without noise below a nanometer, and None where there is no number."""
+    """Return nested lists rounded below a nanometer, with None for missing numbers."""
     rounded = (np.round(array, _DECIMALS) + 0.0).astype(object)
     rounded[np.isnan(array)] = None
     return list(rounded.tolist())
 
 
 def _plain(value: object) -> object:
-    """Return the value as JSON can hold it."""
+    """Return the value as a JSON value."""
     return json.loads(json.dumps(value, default=str))

@@ -1,4 +1,4 @@
-"""A plan's picture: the map with the path, the speed and the acceleration (Fig. 7 and 9)."""
+"""The plot of a plan: the map with the path, the speed and the acceleration (Fig. 7 and 9)."""
 
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ PATH: dict[str, Any] = {
     "linewidth": 2.6,
     "path_effects": [Stroke(linewidth=4.6, foreground="white"), Normal()],
 }
-"""A plan on its map, with a white edge: the map's colors may be near to its own."""
+"""A plan on its map, with a white edge: the map may have similar colors."""
 
 
 @styled()
@@ -39,14 +39,14 @@ def plan_figure(problem: Problem, plan: Plan, title: str) -> Figure:
 
 
 def plot_plan(problem: Problem, plan: Plan, title: str, file: Path) -> None:
-    """Write the picture of a plan to `file`, which appears when it is whole."""
+    """Write the plot of a plan to `file`, which appears when it is complete."""
     save_picture(plan_figure(problem, plan, title), file)
 
 
 def draw_path(axes: Axes, angles_deg: FloatArray, label: str = "_", **line: Any) -> None:  # noqa: ANN401  # matplotlib's
-    """Draw a path `(n,)` over the map, wrapped to one turn: each turn it is in is a line of its own.
+    """Draw a path `(n,)` over the map, wrapped to one turn: each turn has its own line.
 
-    What lies outside the axes does not show; NaN interrupts the path.
+    Parts outside of the axes are not visible; NaN interrupts the path.
     """
     columns = np.arange(len(angles_deg))
     known = angles_deg[np.isfinite(angles_deg)]
@@ -73,6 +73,6 @@ def draw_motion(speed: Axes, acceleration: Axes, problem: Problem, plan: Plan) -
 
 
 def mark_pauses(axes: Axes, pauses: tuple[Pause, ...]) -> None:
-    """Mark the steps in which the table turns while the arm is away."""
+    """Mark the steps in which the table turns while the arm is retracted."""
     for pause in pauses:
         axes.axvline(pause.step + 0.5, color=SKY, linewidth=1.0)

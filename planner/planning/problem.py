@@ -1,4 +1,4 @@
-"""What a planner is asked: the map, the time step, limits, weights and the start."""
+"""The problem for a planner: the map, the time step, limits, weights and the start."""
 
 import math
 from dataclasses import dataclass, field
@@ -14,11 +14,11 @@ from planner.table.motion import Limits
 
 
 class ProblemError(PlannerError):
-    """A question to a planner that has no meaning."""
+    """A problem with invalid values."""
 
 
 class Terms(NamedTuple):
-    """A problem as the compiled kernels take it; `runs` and `runs_down` are from `free_runs`, up and down."""
+    """A problem as arrays for the compiled kernels; `runs` and `runs_down` are from `free_runs`, up and down."""
 
     values: FloatArray
     epsilon: float
@@ -34,16 +34,16 @@ class Terms(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Cross `map` from its first to its last column, one column each `step_s`.
+    """Cross `map` from its first to its last column, one column per `step_s`.
 
     Attributes:
         map: f_R along the scan path, for one arm configuration.
         step_s: time from one scan location to the next.
-        limits: greatest speed and acceleration of the table.
-        weights: k_a and k_omega of Eq. (5); None takes the default for the limits.
-        start_angle_deg: table angle at the first column; None leaves it free.
-        start_speed_deg_s: table speed there; None leaves it free.
-        arm: the arm that has to follow; None plans for the table alone.
+        limits: maximum speed and acceleration of the table.
+        weights: k_a and k_omega of Eq. (5); None: the default for the limits.
+        start_angle_deg: table angle at the first column; None: any angle.
+        start_speed_deg_s: table speed there; None: any speed.
+        arm: the arm that has to follow; None: plan only for the table.
     """
 
     map: ConfigurationMap
@@ -56,7 +56,7 @@ class Problem:
     terms: Terms = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse what is no problem, and lay out what the kernels need."""
+        """Check the values, and prepare the arrays for the kernels."""
         if self.map.location_count < 2:
             raise ProblemError("the map has 1 location; a path needs at least 2")
         _check_positive("time step", "s", self.step_s)
@@ -66,7 +66,7 @@ class Problem:
         _check_weight("acceleration", "1/(deg/s2)^2", weights.acceleration)
         _check_weight("speed", "1/(deg/s)^2", weights.speed)
         if costs_overflow(weights, self.limits, self.map.location_count):
-            raise ProblemError("the weights are so large that the cost of a path overflows; lower them")
+            raise ProblemError("the weights are so large that the cost of a path overflows; reduce them")
         self._check_start()
         terms = Terms(
             values=self.map.values,
@@ -89,7 +89,7 @@ class Problem:
 
     @property
     def attainable_speed_deg_s(self) -> float:
-        """The greatest speed that can occur along the path."""
+        """The maximum possible speed along the path."""
         if self.start_speed_deg_s is None:
             return self.limits.speed_deg_s
         gain_deg_s = self.limits.acceleration_deg_s2 * self.step_s
@@ -97,22 +97,22 @@ class Problem:
 
     @property
     def greatest_step_cost(self) -> float:
-        """What one allowed step costs at most."""
+        """The maximum cost of one allowed step."""
         return greatest_step_cost(Weights(self.terms.acceleration_weight, self.terms.speed_weight), self.limits)
 
     def _check_start(self) -> None:
         if self.start_angle_deg is not None and not math.isfinite(self.start_angle_deg):
-            raise ProblemError(f"the start angle is {self.start_angle_deg}; allowed is any finite angle in degrees")
+            raise ProblemError(f"the start angle is {self.start_angle_deg}; allowed: any finite angle in degrees")
         speed = self.start_speed_deg_s
         if speed is not None and not abs(speed) <= self.limits.speed_deg_s:
-            raise ProblemError(f"the start speed is {speed} deg/s; allowed is up to {self.limits.speed_deg_s} deg/s")
+            raise ProblemError(f"the start speed is {speed} deg/s; allowed: up to {self.limits.speed_deg_s} deg/s")
 
 
 def _check_positive(name: str, unit: str, value: float) -> None:
     if not (math.isfinite(value) and value > 0.0):
-        raise ProblemError(f"the {name} is {value} {unit}; allowed is any finite value above 0")
+        raise ProblemError(f"the {name} is {value} {unit}; allowed: any finite value above 0")
 
 
 def _check_weight(name: str, unit: str, value: float) -> None:
     if not (math.isfinite(value) and value >= 0.0):
-        raise ProblemError(f"the weight of the {name} is {value} {unit}; allowed is any finite value from 0 on")
+        raise ProblemError(f"the weight of the {name} is {value} {unit}; allowed: any finite value from 0 up")

@@ -1,7 +1,7 @@
-"""The motion around which a lattice is laid: from the problem's start to rest on a sample of the map.
+"""The motion at the center of a lattice: from the problem's start to rest on a sample of the map.
 
-A gap of one sample can be passed only at rest on that sample. So the reference brings any start onto one, within the
-limits but without regard to forbidden regions: those are for the search around it.
+A gap of one sample can be passed only at rest on that sample. So the reference brings any start onto a sample, within
+the limits but without regard to forbidden regions: the search around it avoids them.
 """
 
 import numpy as np
@@ -10,14 +10,14 @@ from planner.map.config_map import SAMPLE_TOLERANCE
 from planner.planning.problem import Problem
 from planner.table.motion import Motion, roll_out
 
-# Share of the acceleration limit that the reference uses: the rest is left to the search.
+# Share of the acceleration limit that the reference uses: the rest is for the search.
 ACCELERATION_SHARE = 0.5
 
 
 def reference_motion(problem: Problem) -> Motion:
-    """Return a motion that starts as the problem says, comes to rest on a sample, and stays there.
+    """Return a motion with the problem's start that comes to rest on a sample and stays there.
 
-    Where the angle is free, sample 0 is where it comes to rest; where the speed is free, it rests from the start.
+    If the angle is free, it comes to rest at sample 0; if the speed is free, it rests from the start.
     """
     speed_deg_s = problem.start_speed_deg_s or 0.0
     start_deg = problem.start_angle_deg
@@ -33,7 +33,7 @@ def reference_motion(problem: Problem) -> Motion:
 
 
 def _step_count(problem: Problem, speed_deg_s: float, aside_deg: float) -> int:
-    """Return in how many steps a start can be brought to rest anywhere within `aside_deg` of where it would stop."""
+    """Return the number of steps to bring a start to rest anywhere within `aside_deg` of its stopping point."""
     limit = ACCELERATION_SHARE * problem.limits.acceleration_deg_s2
     if speed_deg_s == 0.0 and aside_deg == 0.0:
         return 0
@@ -51,7 +51,7 @@ def _braking_way(problem: Problem, speed_deg_s: float, steps: int) -> float:
 
 
 def _brake(problem: Problem, start_deg: float, speed_deg_s: float, steps: int, end_deg: float) -> Motion:
-    """Return the motion that comes to rest at `end_deg` with the least sum of squared accelerations, and stays there.
+    """Return the motion that comes to rest at `end_deg` with the minimum sum of squared accelerations, and stays there.
 
     These accelerations are a linear function of time.
     """

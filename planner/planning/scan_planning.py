@@ -1,4 +1,4 @@
-"""From a scan to the best plan: its maps, a problem for each arm configuration, and the planner's answers."""
+"""From a scan to the best plan: its maps, a problem for each arm configuration, and the results of the planner."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ class PlannedScan:
 
 
 class ScanPlans(NamedTuple):
-    """What was planned for a scan, by configuration."""
+    """The planning results of a scan, by configuration."""
 
     scan: Scan
     problems: Mapping[str, Problem]
@@ -71,7 +71,7 @@ class ScanPlans(NamedTuple):
 
     @property
     def best(self) -> PlannedScan | None:
-        """The best plan with its problem and the motion of the arm; None where there is no plan."""
+        """The best plan with its problem and the motion of the arm; None if there is no plan."""
         if self.comparison.best is None:
             return None
         problem, plan = self.problems[self.comparison.best], self.comparison.outcomes[self.comparison.best]
@@ -92,16 +92,16 @@ def plan_scan(
     """Plan a scan in one arm configuration, or in all of them.
 
     Args:
-        scan: what is scanned.
+        scan: the scan.
         configuration: its name, or `best` to compare all.
         angle_count: table angles of a map.
-        planner: who plans.
-        progress: gives the progress of a kind of work.
+        planner: the planner.
+        progress: gives the progress function for a kind of work.
         start_angle_deg: the table's angle at the first location, if it is given.
-        compiled: the name of the planner, if its machine code may be compiled beside the maps.
+        compiled: name of the planner, if its machine code may be compiled in parallel with the maps.
 
     Raises:
-        ConfigurationNameError: The name is none.
+        ConfigurationNameError: the name does not exist.
     """
     asked = list(Configuration) if configuration == "best" else [Configuration.parse(configuration)]
     with compiling_beside(compiled, progress) as wait:

@@ -10,7 +10,7 @@ from planner.errors import PlannerError
 from planner.map.config_map import SAMPLE_TOLERANCE
 from planner.planning.problem import Problem
 
-# From so many samples over one turn on, angles between them gain nothing.
+# With this many samples over one turn, angles between them bring no improvement.
 CLOSE_SAMPLES = 720
 
 
@@ -19,14 +19,14 @@ class GridError(PlannerError):
 
 
 class Grid(NamedTuple):
-    """Where the cost-to-go is sampled.
+    """The sampling points of a cost-to-go.
 
     Attributes:
-        angle_count: angles over one turn.
-        angle_origin_deg: the first of them.
+        angle_count: number of angles over one turn.
+        angle_origin_deg: the first angle.
         speed_step_deg_s: distance of neighboring speeds.
-        half_count: speeds run from -half_count to half_count steps.
-        jumps: (n_jumps,) the changes of speed that a step may make, in speed steps, ascending.
+        half_count: speeds are from -half_count to half_count steps.
+        jumps: (n_jumps,) the allowed changes of speed in a step, in speed steps, ascending.
     """
 
     angle_count: int
@@ -42,7 +42,7 @@ class Grid(NamedTuple):
         return np.linspace(-top_deg_s, top_deg_s, 2 * self.half_count + 1)
 
     def state_count(self, column_count: int) -> int:
-        """Return the number of states of a cost-to-go over so many columns."""
+        """Return the number of states of a cost-to-go over the given number of columns."""
         return column_count * (2 * self.half_count + 1) * self.angle_count
 
 
@@ -57,17 +57,17 @@ def ladder(reach: int, count: int) -> IndexArray:
 def default_grid(
     problem: Problem, refinement: int | None = None, speed_count: int = 61, jump_count: int = 15, least_reach: int = 4
 ) -> Grid:
-    """Return a grid that has the full acceleration among its jumps.
+    """Return a grid with the full acceleration among its jumps.
 
-    Where the table is slow to gain speed the grid has more speeds, so that at least `least_reach` jumps each way exist;
-    and where it cannot reach its greatest speed within the map, the grid ends at what it can reach.
+    If the table is slow to gain speed, the grid has more speeds, so that at least `least_reach` jumps in each direction
+    exist. If it cannot reach its maximum speed within the map, the grid ends at the reachable speed.
 
     Args:
-        problem: what is to be crossed.
-        refinement: angles of the grid per sample of the map; without it two, or one where the samples are close.
-        speed_count: speeds, about.
-        jump_count: changes of speed per step, at most.
-        least_reach: speed steps within the acceleration limit, at least.
+        problem: the problem.
+        refinement: angles of the grid per sample of the map; by default two, or one if the samples are close.
+        speed_count: approximate number of speeds.
+        jump_count: maximum number of changes of speed per step.
+        least_reach: minimum number of speed steps within the acceleration limit.
     """
     if refinement is None:
         refinement = 2 if problem.map.angle_count <= CLOSE_SAMPLES else 1

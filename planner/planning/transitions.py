@@ -1,6 +1,6 @@
-"""What the steps of a grid do: each joins two of its speeds.
+"""The steps of a grid; each connects two of its speeds.
 
-The acceleration of a step, and by how much the angle moves in it, depend on these two speeds alone.
+The acceleration of a step, and its travel, depend only on these two speeds.
 """
 
 from typing import NamedTuple
@@ -17,15 +17,16 @@ from planner.table.motion import swept_angles
 
 
 class Transitions(NamedTuple):
-    """The steps from each speed of a grid, angles in samples of its angle axis.
+    """The steps from each speed of a grid, with angles in samples of its angle axis.
 
     Attributes:
-        step_count: (n_speeds,) steps that stay on the grid; so many entries of a row of the others are filled in.
+        step_count: (n_speeds,) number of steps that stay on the grid; only these entries of a row of the other arrays
+            are used.
         target: (n_speeds, n_jumps) speed index at the end of the step.
-        shift: (n_speeds, n_jumps) whole samples that the angle moves, less than a turn either way.
-        fraction: (n_speeds, n_jumps) and the rest, 0 .. 1.
-        sweep_start: (n_speeds, n_jumps) sample at or below the lowest angle met on the way, within a turn.
-        sweep_length: (n_speeds, n_jumps) cells swept from there, at most one turn.
+        shift: (n_speeds, n_jumps) whole samples of the travel, less than a turn in either direction.
+        fraction: (n_speeds, n_jumps) fraction of a sample of the travel, 0 .. 1.
+        sweep_start: (n_speeds, n_jumps) sample at or below the lowest angle during the step, within a turn.
+        sweep_length: (n_speeds, n_jumps) number of cells crossed from there, at most one turn.
         cost: (n_speeds, n_jumps) first term of Eq. (5), in units.
     """
 
@@ -40,7 +41,7 @@ class Transitions(NamedTuple):
 
 @kernel
 def lay_out_transitions(terms: Terms, grid: Grid, unit: float) -> Transitions:
-    """Return what each step of the grid does, the jumps in the grid's order; steps that leave the grid are none."""
+    """Return the steps of the grid, with the jumps in the grid's order; steps that leave the grid are omitted."""
     speeds = 2 * grid.half_count + 1
     shape = (speeds, len(grid.jumps))
     count = np.zeros(speeds, dtype=np.int64)
@@ -64,7 +65,7 @@ def lay_out_transitions(terms: Terms, grid: Grid, unit: float) -> Transitions:
 
 @kernel
 def _movement(grid: Grid, i: int, j: int, step_s: float) -> tuple[int, float]:
-    """Return by how many whole samples, and by what fraction of one, the angle moves from speed i to speed j."""
+    """Return the whole samples, and the fraction of one, by which the angle moves from speed i to speed j."""
     mean_speed_deg_s = 0.5 * (i + j - 2 * grid.half_count) * grid.speed_step_deg_s
     moved = mean_speed_deg_s * step_s * (grid.angle_count / 360.0)
     whole = sample_at_or_below(moved)
@@ -74,7 +75,7 @@ def _movement(grid: Grid, i: int, j: int, step_s: float) -> tuple[int, float]:
 
 @kernel
 def _sweep(grid: Grid, i: int, acceleration_deg_s2: float, step_s: float) -> tuple[int, int]:
-    """Return the lowest sample that a step from speed i meets, counted from its start, and the cells swept upwards."""
+    """Return the lowest sample of a step from speed i, counted from its start, and the number of cells crossed."""
     samples_per_deg = grid.angle_count / 360.0
     speed_deg_s = (i - grid.half_count) * grid.speed_step_deg_s
     lowest, highest = swept_angles(0.0, speed_deg_s, acceleration_deg_s2, step_s)
@@ -85,5 +86,5 @@ def _sweep(grid: Grid, i: int, acceleration_deg_s2: float, step_s: float) -> tup
 
 @kernel
 def _within_a_turn(samples: int, turn: int) -> int:
-    """Return the samples without their whole turns; short ways keep their sign."""
+    """Return the samples without their whole turns; short distances keep their sign."""
     return samples % turn if samples >= 0 else -(-samples % turn)

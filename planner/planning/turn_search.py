@@ -1,9 +1,9 @@
 """The best path through a lattice that the arm can follow: the turns of its joints are part of the state.
 
-Dijkstra's search over columns, forwards: where it ends, the first location without a way is known, and which joint bars
-the way. A state is (turns, speed i, q); angles, speeds and steps are those of `lattice.py`, turns those of
-`joint_turns.py`. On neighboring q most moves change the turns alike. They are gathered into runs, so that the
-innermost loop runs along q, contiguous and without branches.
+Dijkstra's search over columns, forward. If it ends early, the first location without a path is known, and the joint
+that bars the path. A state is (turns, speed i, q). `lattice.py` defines angles, speeds and steps, and `joint_turns.py`
+the turns. For neighboring q, most moves change the turns in the same way. They are collected into runs, so that the
+innermost loop is along q, contiguous and without branches.
 """
 
 from typing import NamedTuple
@@ -34,26 +34,26 @@ from planner.table.motion import Motion
 
 ChoiceArray = npt.NDArray[np.uint8]
 
-# A choice is the speed before, in one byte.
+# A choice is the speed before the step, in one byte.
 MOST_SPEEDS = 255
 _NO_CHOICE = MOST_SPEEDS
 
 
 class NotFound(NamedTuple):
-    """The first location that no motion on the lattice reaches, and the limit of the arm that bars the way, if any."""
+    """The first location that no motion on the lattice reaches, and the limit of the arm that bars the path, if any."""
 
     location: int
     limit: Reason | None
 
 
 class _Runs(NamedTuple):
-    """Neighboring moves that change the turns alike.
+    """Neighboring moves with the same change of turns.
 
     Attributes:
-        first: (n_runs,) place of the first node.
-        last: (n_runs,) place after the last.
+        first: (n_runs,) index of the first node.
+        last: (n_runs,) index after the last node.
         change: (n_runs,) code of the change.
-        begins: (n_shifts * 2 + 1,) where the runs of each shift and parity begin.
+        begins: (n_shifts * 2 + 1,) index of the first run of each shift and parity.
     """
 
     first: IndexArray
@@ -65,10 +65,10 @@ class _Runs(NamedTuple):
 def node_joints(on_path: ArmOnPath, lattice: Lattice) -> FloatArray:
     """Return the joints at the nodes, in radians, NaN where the arm has no pose: (n + 1, 2, places, 6).
 
-    Node p of a column is in row p & 1 at place (p >> 1) - lattice.first_q + `_reach`.
+    Node p of a column is in row p & 1 at index (p >> 1) - lattice.first_q + `_reach`.
     """
     places = np.arange(-_reach(lattice), lattice.q_count + _reach(lattice))
-    # A node that the turn meets again has to be on the same turn of the joints: it is solved once.
+    # A node that is reached again after a turn must have the same turn of the joints: it is solved once.
     solved = np.arange(lattice.q_count) if lattice.is_closed else places
     offsets_deg = ((2 * (lattice.first_q + solved) + np.array([[0], [1]])) * lattice.node_deg).ravel()
     result = np.empty((len(lattice.reference.angles_deg), 2, len(places), JOINTS))
@@ -82,14 +82,14 @@ def node_joints(on_path: ArmOnPath, lattice: Lattice) -> FloatArray:
 def find_path(
     problem: Problem, lattice: Lattice, joints: FloatArray, turns: Turns, starts: BoolArray
 ) -> Motion | NotFound:
-    """Return the motion of least cost on a lattice that the arm can follow.
+    """Return the motion of minimum cost on a lattice that the arm can follow.
 
     Args:
-        problem: what is to be crossed.
+        problem: the problem.
         lattice: with at most MOST_SPEEDS speeds.
         joints: from `node_joints`.
         turns: limits of the arm.
-        starts: (n_speeds, n_q) where the motion may start, on any turn.
+        starts: (n_speeds, n_q) the possible starts, on any turn.
     """
     shape = len(turns.turns), 2 * lattice.half_count + 1, lattice.q_count
     choices = np.empty((problem.step_count, *shape), dtype=np.uint8)
@@ -112,7 +112,7 @@ def find_path(
 
 
 def _start_costs(problem: Problem, lattice: Lattice, joints: FloatArray, turns: Turns, starts: BoolArray) -> FloatArray:
-    """Return 0 where a motion may start and infinity elsewhere: (n_turns, n_speeds, n_q)."""
+    """Return 0 for a possible start and infinity elsewhere: (n_turns, n_speeds, n_q)."""
     costs = np.full((len(turns.turns), *starts.shape), np.inf)
     fits = [fitting(turns, row) for row in joints]
     for s, q in np.argwhere(starts).tolist():
@@ -124,7 +124,7 @@ def _start_costs(problem: Problem, lattice: Lattice, joints: FloatArray, turns: 
 
 
 def _up_to(lattice: Lattice, column: int) -> Lattice:
-    """Return the lattice that ends with a column: its last step is laid out on its own."""
+    """Return the lattice that ends with a column: its last step is prepared on its own."""
     angles_deg, speeds_deg_s, accelerations_deg_s2 = lattice.reference
     end = column + 1
     return lattice._replace(reference=Motion(angles_deg[:end], speeds_deg_s[:end], accelerations_deg_s2[:column]))
@@ -133,7 +133,10 @@ def _up_to(lattice: Lattice, column: int) -> Lattice:
 def _first_bar(
     terms: Terms, lattice: Lattice, turns: Turns, joints: FloatArray, alive: list[BoolArray]
 ) -> Reason | None:
-    """Return the limit that bars most moves of the last step, or where only the table's do, of the last one before."""
+    """Return the limit that bars most moves of the last step.
+
+    If only the table's limits bar them, use the previous step.
+    """
     bars, rows = np.zeros(BARS, dtype=np.int64), make_rows(lattice)
     for k in range(len(alive) - 1, -1, -1):
         lay_out_step(terms, _up_to(lattice, k + 1), k, rows)
@@ -145,15 +148,15 @@ def _first_bar(
 
 @kernel
 def _reach(lattice: Lattice) -> int:
-    """Return how many places of joints lie before `first`, and after the last q: as far as the end of a step."""
+    """Return the number of entries of joints before `first`, and after the last q: as far as the end of a step."""
     return 2 * lattice.half_count + 2
 
 
 @kernel
 def _gather(lattice: Lattice, turns: Turns, before: FloatArray, after: FloatArray) -> _Runs:
-    """Return the moves of a step that no joint bars by its speed, from joints (2, places, 6) to joints.
+    """Return the moves of a step that no joint speed bars, from joints (2, places, 6) to joints.
 
-    The moves by `shift` nodes from nodes of a parity begin at `begins[2 * (shift + 2 * half_count) + parity]`.
+    The moves by `shift` nodes from nodes of a parity start at `begins[2 * (shift + 2 * half_count) + parity]`.
     """
     most, places = 2 * lattice.half_count, before.shape[1]
     first, last = np.empty((4 * most + 2) * places, dtype=np.int64), np.empty((4 * most + 2) * places, dtype=np.int64)
@@ -176,7 +179,7 @@ def _gather(lattice: Lattice, turns: Turns, before: FloatArray, after: FloatArra
 
 @kernel
 def _arrivals(lattice: Lattice, turns: Turns, joints: FloatArray, rows: StepRows) -> FloatArray:
-    """Return what it costs to arrive at the nodes of a column on each of the turns: (n_turns, 2, places of rows)."""
+    """Return the cost of arriving at the nodes of a column on each of the turns: (n_turns, 2, places of rows)."""
     costs = np.full((len(turns.turns), *rows.value_cost.shape), np.inf)
     ahead = _reach(lattice) - margin(lattice)
     for parity in range(2):
@@ -201,7 +204,7 @@ def _advance(
     later: FloatArray,
     choices: ChoiceArray,
 ) -> None:
-    """Write what the states of the next column cost, and the speed before each, given the states of column k."""
+    """Write the cost of the states of the next column, and the speed before each, from the states of column k."""
     half, barrier, leaving = lattice.half_count, np.empty(lattice.q_count), np.empty(lattice.q_count)
     later[:], choices[:] = np.inf, _NO_CHOICE
     for s in range(2 * half + 1):
@@ -222,7 +225,7 @@ def _advance(
 
 @kernel
 def _write_barrier(terms: Terms, lattice: Lattice, k: int, i: int, j: int, rows: StepRows, barrier: FloatArray) -> bool:
-    """Write per q what the step from speed i to j costs before its arrival; return whether it is allowed anywhere."""
+    """Write per q the cost of the step from speed i to j without its arrival; return whether it is allowed anywhere."""
     reference, unit = lattice.reference, speed_unit(lattice, terms.step_s)
     speed, later = reference.speeds_deg_s[k] + i * unit, reference.speeds_deg_s[k + 1] + j * unit
     acceleration = reference.accelerations_deg_s2[k] + (j - i) * unit / terms.step_s
@@ -258,7 +261,7 @@ def _move(
     later: FloatArray,
     choices: ChoiceArray,
 ) -> None:
-    """Lower the costs of the next column to those of one step, from speed i to j and from one combination of turns."""
+    """Reduce the costs of the next column to those of one step, from speed i to j and from one combination of turns."""
     half, count = lattice.half_count, lattice.q_count
     start, ahead = _reach(lattice) + (i >> 1), margin(lattice) + (j >> 1)
     number = 2 * (i + j + 2 * half) + (i & 1)
@@ -279,7 +282,7 @@ def _move(
 
 @kernel
 def _lower(leaving: FloatArray, arrival: FloatArray, choice: int, later: FloatArray, choices: ChoiceArray) -> None:
-    """Lower the costs of neighboring states of the next column where those of this one offer less."""
+    """Reduce the costs of neighboring states of the next column if those of this column are lower."""
     for m in range(len(leaving)):
         total = leaving[m] + arrival[m]
         is_better = total < later[m]
@@ -299,7 +302,7 @@ def _count_bars(
     alive: BoolArray,
     bars: IndexArray,
 ) -> None:
-    """Count the moves of the table in a step that each bar of the arm bars, (BARS,): see `count_bar`."""
+    """Count the table's moves in a step that each bar of the arm prevents, (BARS,): see `count_bar`."""
     half, reach, barrier = lattice.half_count, _reach(lattice), np.empty(lattice.q_count)
     for i in range(-half, half + 1):
         first, last = steps_from(terms, lattice, k, i)
@@ -321,7 +324,7 @@ def _count_bars(
 def _backtrack(
     lattice: Lattice, turns: Turns, joints: FloatArray, choices: ChoiceArray, c: int, i: int, m: int
 ) -> tuple[int, IndexArray]:
-    """Return the first q, and i at each column (n + 1,), of the best way into a state of the last column."""
+    """Return the first q, and i at each column (n + 1,), of the best path to a state of the last column."""
     steps, half, reach = len(choices), lattice.half_count, _reach(lattice)
     speeds = np.empty(steps + 1, dtype=np.int64)
     speeds[steps] = i

@@ -1,10 +1,10 @@
-"""Prove that a map cannot be crossed: a superset of the states that can be reached, which is empty somewhere.
+"""Prove that a map cannot be crossed: a superset of the reachable states is empty in some column.
 
-Speeds are gathered into cells. For each column and cell, the angles that any motion within the limits can have there,
-at any speed of the cell, lie in a union of intervals: a step widens it by the least and the greatest angle that a
-motion from one cell to the other moves, and a run of samples that are allowed in both columns clips it. All sets are
-rounded outwards, by far more than what a plan may deviate. So where all of them are empty no motion exists; the reverse
-need not hold, since the cells forget which speed belongs to which angle. Smaller cells forget less.
+Speeds are grouped into cells. For each column and cell, the angles that any motion within the limits can have there, at
+any speed of the cell, are in a union of intervals. A step widens it by the minimum and maximum travel of a motion from
+one cell to the other. A run of samples that are allowed in both columns clips it. All sets are rounded outward, by far
+more than the allowed deviation of a plan. So if all of them are empty, no motion exists. The converse need not be true,
+because a cell does not store which speed belongs to which angle. Smaller cells are more accurate.
 """
 
 from typing import NamedTuple
@@ -18,24 +18,24 @@ from planner.planning.interval_union import unite
 from planner.planning.problem import Problem, Terms
 from planner.planning.verification import ROUNDING
 
-# By how much limits (relative, and what a verified plan may exceed) and runs and ways (in samples) are widened.
+# Tolerances: for limits (relative, as in the check of a plan), and for runs and travel (in samples).
 LIMIT_MARGIN = 1e-7
 SAMPLE_MARGIN = 1e-6
 
-# Pairs of an interval and a run, about a second: a proof that takes more is given up.
+# Maximum number of pairs of an interval and a run, about a second: a longer proof is abandoned.
 MOST_WORK = 100_000_000
 
-# How many times smaller cells name the location, once there is a proof.
+# Factor by which the cells are smaller that find the location, once there is a proof.
 FINER = 4
 
 
 class Reachable(NamedTuple):
-    """Angles that can be reached in a column, in samples, per cell of speed.
+    """Reachable angles of a column, in samples, per cell of speed.
 
     Attributes:
-        slowest: bound of the speeds.
-        fastest: bound of the speeds.
-        interval_count: (n_cells,) intervals of each cell.
+        slowest: lower bound of the speeds.
+        fastest: upper bound of the speeds.
+        interval_count: (n_cells,) number of intervals of each cell.
         lows: (n_cells, room) their lower ends.
         highs: (n_cells, room) their upper ends.
     """
@@ -48,12 +48,12 @@ class Reachable(NamedTuple):
 
 
 class Widening(NamedTuple):
-    """What steps from one cell to another do, in samples.
+    """The effect of steps from one cell to another, in samples.
 
     Attributes:
-        least: the angle moved, at least.
-        most: the angle moved, at most.
-        beyond_start: how far beyond its start each of them turns back, at least; upwards if positive.
+        least: minimum travel.
+        most: maximum travel.
+        beyond_start: minimum distance beyond its start at which each of them reverses; upward if positive.
         beyond_end: the same, beyond its end.
     """
 
@@ -67,8 +67,8 @@ def first_unreachable_location(problem: Problem, cell_count: int) -> int | None:
     """Return the first location that no motion from the start reaches; None without a proof.
 
     Args:
-        problem: what is to be crossed; a free start means all angles, or all speeds.
-        cell_count: cells of speed for the proof; the location is named with smaller ones.
+        problem: the problem; a free start means all angles, or all speeds.
+        cell_count: number of cells of speed for the proof; smaller cells find the location.
     """
     location = _first_empty_column(problem, cell_count)
     if location is None:
@@ -97,7 +97,7 @@ def _first_empty_column(problem: Problem, cell_count: int) -> int | None:
 
 @kernel
 def _first_empty(terms: Terms, edges: FloatArray, start: Reachable) -> int:
-    """Return the first column in which nothing can be reached; -1 where something can in all, or is unknown."""
+    """Return the first column in which nothing can be reached; -1 if there is none, or if it is unknown."""
     reachable, work = start, 0.0
     cells_in_a_step = 2.0 * terms.acceleration_limit_deg_s2 * terms.step_s / (edges[1] - edges[0]) + 3.0
     cells_in_a_step = min(cells_in_a_step, float(len(edges) - 1))
@@ -114,7 +114,7 @@ def _first_empty(terms: Terms, edges: FloatArray, start: Reachable) -> int:
 
 @kernel
 def _step(terms: Terms, edges: FloatArray, column: int, now: Reachable) -> Reachable:
-    """Return what can be reached in the next column."""
+    """Return the reachable angles of the next column."""
     turn, cells = float(terms.values.shape[1]), len(edges) - 1
     gain = (terms.acceleration_limit_deg_s2 * (1.0 + LIMIT_MARGIN) + ROUNDING) * terms.step_s
     scale = 0.5 * terms.step_s * turn / 360.0
@@ -122,7 +122,7 @@ def _step(terms: Terms, edges: FloatArray, column: int, now: Reachable) -> Reach
     run_lows, run_highs = runs_of(terms.runs, column)
     count = np.zeros(cells, dtype=np.int64)
     lows, highs = np.empty((cells, now.lows.shape[1])), np.empty((cells, now.lows.shape[1]))
-    # Of disjoint intervals and disjoint runs, few pairs meet twice around the turn.
+    # For disjoint intervals and disjoint runs, few pairs overlap twice around the turn.
     room = 4 * now.interval_count.sum() * (len(run_lows) + 1)
     piece_lows, piece_highs = np.empty(room), np.empty(room)
     for later in range(cells):
@@ -156,7 +156,7 @@ def _step(terms: Terms, edges: FloatArray, column: int, now: Reachable) -> Reach
 def widening_between(
     low: float, high: float, later_low: float, later_high: float, gain: float, scale: float
 ) -> Widening:
-    """Return what the steps do from a speed of one cell to a speed of another that is at most `gain` away."""
+    """Return the effect of steps from a speed of one cell to a speed of another that is at most `gain` away."""
     least = max(low, later_low - gain) + max(later_low, low - gain)
     most = min(high, later_high + gain) + min(later_high, high + gain)
     return Widening(
@@ -169,7 +169,7 @@ def widening_between(
 
 @kernel
 def _least_turn(low: float, high: float, later_low: float, later_high: float) -> float:
-    """Return how far beyond its start a step turns back at least, times 2 / dt; upwards if positive."""
+    """Return the minimum distance beyond its start at which a step reverses, times 2 / dt; upward if positive."""
     if low > 0.0 and later_high < 0.0:
         return low * low / (low - later_low)
     if high < 0.0 and later_low > 0.0:
@@ -196,7 +196,7 @@ def _widen(
     piece_highs: FloatArray,
     pieces: int,
 ) -> int:
-    """Append to what angles steps lead from an interval; return the new number of pieces."""
+    """Append the angles to which steps lead from an interval; return the new number of pieces."""
     if len(run_lows) == 1 and run_highs[0] - run_lows[0] >= turn:
         return _append(low + widening.least, high + widening.most, turn, piece_lows, piece_highs, pieces)
     above_start, below_start = max(widening.beyond_start, 0.0), max(-widening.beyond_start, 0.0)
@@ -216,7 +216,7 @@ def _widen(
 
 @kernel
 def _append(low: float, high: float, turn: float, piece_lows: FloatArray, piece_highs: FloatArray, pieces: int) -> int:
-    """Append an interval, turned so that its lower end lies within 0 .. turn."""
+    """Append an interval, shifted so that its lower end is within 0 .. turn."""
     back = turn * np.floor(low / turn)
     piece_lows[pieces], piece_highs[pieces] = low - back, high - back
     return pieces + 1

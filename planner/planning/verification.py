@@ -1,4 +1,4 @@
-"""Check a plan as it would be executed, whoever made it: forbidden regions, limits, and how far it stays from both."""
+"""Check any plan for its execution: forbidden regions, limits, and the margins from both."""
 
 from typing import NamedTuple
 
@@ -9,19 +9,19 @@ from planner.planning.crossing import step_is_allowed
 from planner.planning.plan import Plan
 from planner.planning.problem import Problem
 
-# Speeds and accelerations come out of additions: this much above a limit is rounding.
+# Speeds and accelerations result from sums: an excess of this size over a limit is rounding.
 ROUNDING = 1e-9
 
 
 class Verification(NamedTuple):
-    """What the execution of a plan would meet.
+    """The result of the check of a plan.
 
     Attributes:
-        forbidden_steps: steps that meet a forbidden region at their end or on the way to it.
-        clearance_deg: least distance from a forbidden sample, along the angle axis, over all locations;
-            infinite where no location has any.
-        speed_margin_deg_s: what is left to the speed limit; negative where it is exceeded.
-        acceleration_margin_deg_s2: what is left to the acceleration limit; negative where it is exceeded.
+        forbidden_steps: steps that touch a forbidden region at their end or before it.
+        clearance_deg: minimum distance from a forbidden sample, along the angle axis, over all locations; infinity if
+            no location has any.
+        speed_margin_deg_s: margin to the speed limit; negative if it is exceeded.
+        acceleration_margin_deg_s2: margin to the acceleration limit; negative if it is exceeded.
     """
 
     forbidden_steps: tuple[int, ...]
@@ -31,17 +31,17 @@ class Verification(NamedTuple):
 
     @property
     def within_limits(self) -> bool:
-        """Whether neither limit is exceeded by more than rounding."""
+        """Whether no limit is exceeded by more than rounding."""
         return self.speed_margin_deg_s >= -ROUNDING and self.acceleration_margin_deg_s2 >= -ROUNDING
 
     @property
     def is_executable(self) -> bool:
-        """Whether the table can carry the plan out and nothing forbidden is met."""
+        """Whether the table can execute the plan without touching a forbidden region."""
         return self.within_limits and not self.forbidden_steps
 
 
 def verify(problem: Problem, plan: Plan) -> Verification:
-    """Return what the execution of a plan would meet. In a pause only the end of the step counts."""
+    """Check a plan for its execution. In a pause only the end of the step counts."""
     limits = problem.limits
     return Verification(
         forbidden_steps=_forbidden_steps(problem, plan),

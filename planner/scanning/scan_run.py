@@ -1,6 +1,6 @@
-"""A scan from end to end: plan, move and latch, measure, align, write, error budget.
+"""A complete scan: plan, move and latch, measure, align, write, error budget.
 
-The workpiece is measured where it truly is, at the table's true angle, and aligned with what was latched: the
+The workpiece is measured at its true position, at the true angle of the table, and aligned with the latched values. The
 difference is the error that the error budget divides among its sources.
 """
 
@@ -45,16 +45,16 @@ from protocol.progress import Progress, ProgressOf
 
 # Profiles that are measured at once: some 40 000 points.
 _BLOCK = 64
-# Profiles that are nearer to one another leave no gap.
+# Profiles closer than this leave no gap.
 COVERED_MM = 2.0
 
 
 class ScanError(PlannerError):
-    """A scan that cannot be carried out."""
+    """A scan that cannot be performed."""
 
 
 class ScanOptions(NamedTuple):
-    """How a scan is carried out; see the options of `python -m planner scan`."""
+    """Settings of a scan; see the options of `python -m planner scan`."""
 
     port: str = "emulator://"
     baud: int = 9600
@@ -75,7 +75,7 @@ class ScanOptions(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """What the alignment knows of the cell, and from which measurements."""
+    """The placements for the alignment, and the measurements that they are from."""
 
     calibration: Calibration
     axis: AxisCalibration | None = None
@@ -83,7 +83,7 @@ class Knowledge:
 
     @classmethod
     def of(cls, scan: Scan, probe: LaserProbe, exact: bool, seed: int) -> Self:
-        """Return the cell's own placements, or what the calibrations find from a drawing that is some mm off."""
+        """Return the cell's own placements, or the calibrated ones, starting from a drawing with errors of some mm."""
         true = Calibration.of(scan.cell)
         if exact:
             return cls(true)
@@ -93,14 +93,14 @@ class Knowledge:
 
 
 def _part_size(scan: Scan) -> PartSize:
-    """Return the cylinder about the table's axis that holds the workpiece."""
+    """Return the cylinder around the table's axis that contains the workpiece."""
     on_table = np.asarray(scan.mesh.vertices) @ scan.cell.T_TW[:3, :3].T + scan.cell.T_TW[:3, 3]
     return PartSize(float(np.hypot(on_table[:, 0], on_table[:, 1]).max()), float(on_table[:, 2].max()))
 
 
 @dataclass(frozen=True, eq=False)
 class Scanned:
-    """What a scan came to."""
+    """The results of a scan."""
 
     scan: Scan
     options: ScanOptions
@@ -115,12 +115,12 @@ class Scanned:
 
     @property
     def dead_line(self) -> DeadLine:
-        """How far the table would have run on if the line had died, and into what."""
+        """The consequences if the line had failed."""
         return judge_dead_line(self.planned.problem.map, self.planned.motion(), self.run.record)
 
     @property
     def is_whole(self) -> bool:
-        """Whether the motion and the measuring came to their ends."""
+        """Whether the motion and the measurement were completed."""
         return self.run.failure is None and not self.is_interrupted
 
 
@@ -128,7 +128,7 @@ def planned_scan(scan: Scan, configuration: str, angle_count: int, progress: Pro
     """Return the best motion for a scan.
 
     Raises:
-        ScanError: There is none that the arm can follow.
+        ScanError: there is no motion that the arm can follow.
     """
     plans = plan_scan(scan, configuration, angle_count, PLANNERS[DEFAULT_PLANNER], progress, compiled=DEFAULT_PLANNER)
     planned = plans.best
@@ -142,12 +142,12 @@ def planned_scan(scan: Scan, configuration: str, angle_count: int, progress: Pro
 
 
 def run_on_port(planned: RunInput, options: ScanOptions, progress: ProgressOf) -> LatchedRun:
-    """Return what was latched while the table at the port made the motion.
+    """Return the values latched while the table at the port executed the motion.
 
     Raises:
-        PlannerError: The port lets no trigger through, the commands do not fit it, the table would run up or out
-            through a forbidden region, or nothing was scanned.
-        TableError: The table does not answer, or did not come to the start.
+        PlannerError: the port allows no trigger, the serial line is too slow for the commands, the run-up or the stop
+            would cross a forbidden region, or nothing was scanned.
+        TableError: the table does not reply, or did not reach the start.
     """
     wire = Wire(options.decimals, options.baud)
     motion, limits = planned.motion(), planned.problem.limits
@@ -177,21 +177,21 @@ def _trigger_line(port: object, table: TableClient, options: ScanOptions) -> Tri
         return ProbeOnPort(simulated, conditions.rate_hz, conditions.delay_s, conditions.faults, conditions.seed)
     if options.control is None:
         raise ScanError(
-            f"{options.port}: the simulated probe has no line to trigger this table;"
+            f"{options.port}: the simulated probe cannot trigger this table;"
             " use emulator://, or an emulator with its --control channel"
         )
     return ProbeByHand(ControlChannel(options.control, CONTROL_TIMEOUT_S), table.clock)
 
 
 def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: ProgressOf) -> Scanned:
-    """Carry a scan out, write its cloud to `out`, and return what it came to.
+    """Perform a scan, write its cloud to `out`, and return the results.
 
-    Whatever interrupts it, what was scanned until then is written.
+    After an interruption, the data scanned so far are written.
 
     Raises:
-        PlannerError: It cannot be carried out, or nothing was scanned.
-        TableError: The table does not answer.
-        OSError: The folder cannot be written.
+        PlannerError: the scan cannot be performed, or nothing was scanned.
+        TableError: the table does not reply.
+        OSError: the folder cannot be written.
     """
     probe = options.probe or LaserProbe.of(scan.cell.probe)
     if options.triggers.rate_hz > probe.line_rate_hz:
@@ -218,7 +218,7 @@ def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: Progre
 
 
 class _Measuring:
-    """The profiles of a run, block by block, from the probe to the cloud."""
+    """The profiles of a run, processed in blocks from the probe to the cloud."""
 
     def __init__(self, mesh: trimesh.Trimesh, probe: LaserProbe, chain: Chain, options: ScanOptions) -> None:
         self.samples = Samples()
@@ -227,7 +227,7 @@ class _Measuring:
         self._caster, self._probe, self._chain, self._seed = caster, probe, chain, options.seed
 
     def go(self, ply: PlyWriter, xyz: XyzWriter | None, progress: Progress | None) -> bool:
-        """Measure, align and write all profiles; return False when Ctrl-C came before the last."""
+        """Measure, align and write all profiles; return False if Ctrl-C came before the last one."""
         total = len(self._chain.run.numbers)
         true_T_WS, known_T_WS = self._chain.poses(()), self._known_poses()
         try:
@@ -241,7 +241,7 @@ class _Measuring:
         return True
 
     def _known_poses(self) -> FloatArray:
-        """Return T_WS `(n, 4, 4)` from what was latched and calibrated alone."""
+        """Return T_WS `(n, 4, 4)` only from the latched and the calibrated values."""
         run, chain = self._chain.run, self._chain
         return probe_poses(chain.known, chain.flange_poses(run.joints_deg), run.angles_deg)
 

@@ -184,7 +184,7 @@ def test_an_unknown_planner_is_refused_with_those_that_there_are(capsys: pytest.
 
 def test_two_packages_with_one_name_are_both_named(tmp_path: Path) -> None:
     install(tmp_path / "site", "other-things", {PLANNER_GROUP: {"mine": "elsewhere:plan"}})
-    with pytest.raises(PlugInError, match=r"'mine': other-things .* and own-things .* both bring one of that name"):
+    with pytest.raises(PlugInError, match=r"'mine': other-things .* and own-things .* both provide this name"):
         load_plug_in(PLANNER_GROUP, "mine")
 
 
@@ -212,7 +212,7 @@ def test_a_factor_of_another_package_counts_in_the_map_when_the_scan_names_it(tm
         ('["number"]', "factor 'number': is not a function"),
         (
             '["haf"]',
-            "factor 'haf': is not known; there are half, large, north, number, raising, scalar; did you mean",
+            "factor 'haf': not found; allowed are half, large, north, number, raising, scalar; did you mean",
         ),
         ('["half", "half"]', "value.user_factors is ['half', 'half']; it must be a list of different names"),
         ('"half"', "value.user_factors is 'half'; it must be a list of texts"),

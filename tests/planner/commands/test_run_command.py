@@ -125,7 +125,7 @@ def test_a_plan_for_a_faster_table_is_refused(
     document["limits"]["speed_deg_s"] = 60.0
     plan_file.write_text(json.dumps(document))
     assert run(plan_file, tmp_path / "run") == 2
-    assert "plan within this table's own limits" in capsys.readouterr().err
+    assert "create a plan within the limits of the table" in capsys.readouterr().err
 
 
 def test_a_folder_without_a_run_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -207,7 +207,7 @@ def test_a_scan_that_meets_nothing_says_so_and_leaves_no_cloud(
         (["--port", "/dev/does-not-exist"], "cannot open"),
         (["--port", "emulator://?seed=x"], "cannot open"),
         (["--rate", "150"], "beyond the probe's 100"),
-        (["--configuration", "SIDEWAYS"], "no arm configuration"),
+        (["--configuration", "SIDEWAYS"], "is not an arm configuration"),
         (["--configuration", "RIGHTY-BELOW-FLIP"], "there is no plan"),
     ],
 )

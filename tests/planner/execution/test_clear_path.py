@@ -63,7 +63,7 @@ def test_the_way_to_the_start_is_the_shorter_of_the_free_ones(seed: int) -> None
 
 def test_without_a_clear_path_nothing_is_moved() -> None:
     walled_twice = blocks_map(8, 360, [(0, 7, 100, 120), (0, 7, 200, 220)], edge=0)
-    with pytest.raises(BlockedPathError, match="draw the arm back, and say so with --arm-away"):
+    with pytest.raises(BlockedPathError, match="retract the arm, and add --arm-away"):
         turns_to_start(walled_twice, 0.0, 150.0)
 
 

@@ -39,7 +39,7 @@ def test_a_run_on_the_plan_is_verified_and_costs_what_was_planned(run_input: Run
 def test_a_run_beside_the_plan_has_deviated(run_input: RunInput) -> None:
     result = checked(run_input, 0.3)
     assert not result.is_verified
-    assert result.verdict == "deviated: 0.300 deg at a location, allowed are 0.25"
+    assert result.verdict == "deviated: 0.300 deg at a location; allowed: 0.25"
 
 
 def test_a_path_into_a_forbidden_cell_has_deviated(run_input: RunInput) -> None:

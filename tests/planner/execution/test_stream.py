@@ -152,7 +152,7 @@ def test_what_does_not_fit_the_wire_is_refused_with_a_step_that_does() -> None:
     wire = Wire()
     quick = TableMotion(random_plan(generator, 0.04, 2.0, LIMITS), LIMITS)
     with pytest.raises(
-        StreamError, match=r"at 9600 baud.* step before lasts 40 ms; a time step of 0\.\d+ s"
+        StreamError, match=r"at 9600 baud.* previous step takes 40 ms; use a time step of at least 0\.\d+ s"
     ) as refusal:
         check_it_fits(stream(quick, LIMITS, wire), wire)
     fitting_s = float(str(refusal.value).split("a time step of ")[1].split()[0])

@@ -128,5 +128,5 @@ def test_a_surface_with_one_side_is_refused_with_the_place() -> None:
         faces += [(a, b, c), (a, c, d)]
     klein = np.array(faces)
     vertices = np.random.default_rng(0).uniform(-50.0, 50.0, (72, 3))
-    with pytest.raises(WorkpieceError, match=r"disagree on which side is out, at \d+ edges, the first near x "):
+    with pytest.raises(WorkpieceError, match=r"are oriented inconsistently, at \d+ edges, the first near x "):
         turned_outward(vertices, klein)

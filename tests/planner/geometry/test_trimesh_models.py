@@ -18,7 +18,7 @@ from planner.geometry.mesh import load_mesh
 FOLDER = Path(os.environ.get("TRIMESH_MODELS", "no such folder"))
 REASONS = (
     "the file is empty|the mesh is empty|the mesh is open at|the mesh crosses itself near|this PLY file (lacks|ends)"
-    "|line \\d+: a face has 2 corners|a face with \\d+ corners|the triangles disagree"
+    "|line \\d+: a face has 2 corners|a face with \\d+ corners|the triangles are oriented"
 )
 
 

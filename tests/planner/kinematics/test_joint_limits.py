@@ -55,7 +55,7 @@ def test_every_joint_is_held_to_its_speed_either_way(joint: int, sign: float) ->
 
 def test_a_turn_that_is_not_carried_along_is_a_fault_though_the_joint_is_fast_enough() -> None:
     fault = first_joint_fault(VIPER, path(6, [170.0, -170.0]), 1.0)
-    assert str(fault) == ("at location 1 joint 6 moves by -340.0 deg from the location before, more than half a turn")
+    assert str(fault) == ("at location 1 joint 6 moves by -340.0 deg from the previous location, more than half a turn")
     assert first_joint_fault(VIPER, path(6, [170.0, 190.0]), 1.0) is None
 
 

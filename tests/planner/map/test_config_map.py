@@ -111,7 +111,7 @@ def test_an_epsilon_that_forbids_all_or_nothing_is_refused(epsilon: float) -> No
 
 @pytest.mark.parametrize("location", [-0.1, 5.1, math.nan])
 def test_a_point_off_the_map_is_refused(location: float) -> None:
-    with pytest.raises(ConfigurationMapError, match="off the map"):
+    with pytest.raises(ConfigurationMapError, match="outside of the map"):
         random_map(1).value(location, 0.0)
 
 

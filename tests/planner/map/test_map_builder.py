@@ -196,7 +196,7 @@ def test_a_users_factor_multiplies_into_the_map_and_may_forbid() -> None:
 
 def test_more_cells_than_memory_can_hold_are_refused_before_the_map_is_begun() -> None:
     done: list[tuple[int, int]] = []
-    with pytest.raises(ConfigurationMapError, match="57,600,000 cells; at most 50,000,000 are allowed: take fewer ang"):
+    with pytest.raises(ConfigurationMapError, match="57,600,000 cells; at most 50,000,000 are allowed; use fewer ang"):
         build_maps(cylinder(12), ALL, 600_000, lambda *now: done.append(now))
     assert done == []
 

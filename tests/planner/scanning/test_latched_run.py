@@ -119,7 +119,7 @@ def test_a_trigger_fault_drops_at_most_its_own_profiles(sound: LatchedRun, fault
 
 def test_a_table_that_hears_no_trigger_gives_nothing_and_says_why() -> None:
     deaf = TriggerConditions(faults=TriggerFaults(robot_misses=frozenset(range(1000))))
-    with pytest.raises(NothingScannedError, match=r"all \d+ profiles were dropped, most because the robot latched"):
+    with pytest.raises(NothingScannedError, match=r"all \d+ profiles were dropped, mostly because the robot latched"):
         latched_run(deaf)
 
 
