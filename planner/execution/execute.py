@@ -81,13 +81,13 @@ class Commands(Protocol):
         """Return when the next command has to be asked for, without lead; None when all are sent."""
 
     def latest_s(self, timed: TimedCommand) -> float:
-        """Return how late a command may be sent."""
+        """Return the maximum delay of a command."""
 
     def sent(self, timed: TimedCommand, late_s: float) -> None:
-        """Take note that the next command was sent, and how late."""
+        """Record that the next command was sent, and its delay."""
 
     def encoder_read(self, time_s: float, angle_deg: float) -> None:
-        """Take note of where the encoder was at a time that is known for certain."""
+        """Record the position of the encoder at a time that is known exactly."""
 
 
 def execute(
@@ -142,13 +142,13 @@ def execute_commands(
 
     Args:
         table: the client at the table's port.
-        motion: what the table should do.
-        commands: what to send.
-        wire: what the commands have to pass.
-        settings: how it is run.
-        view: a way to look into the table, where there is one.
+        motion: the planned motion of the table.
+        commands: the commands to send.
+        wire: properties of the serial line.
+        settings: settings for the execution.
+        view: access to the ground truth of the table, if there is one.
         progress: called with the time of the motion and its end, in ms.
-        record: where to write what happens, if the caller wants to see it meanwhile.
+        record: the record to fill, for a caller that reads it during the motion.
     """
     # The first command's S and A are to be sent in peace.
     preparation_s = 4.0 * exchanges_s(wire, _ANY_COMMAND)

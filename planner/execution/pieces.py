@@ -38,7 +38,7 @@ def pieces_of(motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float
 
 
 def farthest_deg(motion: TableMotion) -> float:
-    """Return the greatest angle from 0 at which a leg of a motion begins."""
+    """Return the maximum distance from angle 0 of the start of a leg of a motion."""
     return max(abs(leg.start.angle_deg) for leg in motion.legs)
 
 

@@ -63,17 +63,17 @@ def stream(motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float = 
 
 
 class Encoder:
-    """The command of each piece of a motion, from where the commands before it have brought the reference."""
+    """The command of each piece of a motion, starting from the reference after the commands before it."""
 
     def __init__(self, motion: MotionInTime, limits: Limits, wire: Wire, run_on_deg: float, spacing_s: float) -> None:
         """Encode a motion.
 
         Args:
-            motion: what the table should do.
-            limits: greatest S and A.
-            wire: how fine the numbers are.
-            run_on_deg: how far the table may run on when the line dies.
-            spacing_s: how long before the end of a piece its command has to take effect at the latest.
+            motion: the planned motion of the table.
+            limits: maximum S and A.
+            wire: resolution of the numbers.
+            run_on_deg: maximum angle that the table may run on if the line fails.
+            spacing_s: minimum time from a command until the end of its piece.
         """
         self._motion, self._run_on_deg, self._spacing_s = motion, run_on_deg, spacing_s
         self._grid = Grid(limits, wire)
@@ -95,9 +95,9 @@ class Encoder:
 
         Args:
             running: the command before it, as it took effect; None at the start.
-            before: where the reference is at a time without a new command.
-            piece: what the command is for.
-            first_s: its moment, where that is given.
+            before: the reference at a time without a new command.
+            piece: the piece for the command.
+            first_s: the time of the command, if it is given.
         """
         if piece.command is not None:
             return Choice(piece.start_s if first_s is None else first_s, self._grid.command(piece.command))
@@ -148,11 +148,11 @@ class Streaming:
         return tuple(self._chain(None, self._encoder.start, self._pieces))
 
     def commands_after(self, running: TimedCommand, sent: int, next_s: float) -> Iterator[TimedCommand]:
-        """Yield the commands that follow the first `sent` ones, from where those brought the reference.
+        """Yield the commands after the first `sent` ones, from the reference that results from those.
 
         Args:
             running: the last command that was sent, as it took effect.
-            sent: how many commands were sent.
+            sent: number of commands that were sent.
             next_s: when the next command takes effect; the running one has been given a target for that.
         """
         return self._chain(running, running.expected, self._pieces[sent:], max(next_s, running.time_s))
@@ -174,7 +174,7 @@ class Streaming:
 
 
 def standing_at(state: ReferenceState) -> Callable[[float], ReferenceState]:
-    """Return where a reference is that rests, at any time."""
+    """Return the position of a resting reference, at any time."""
     return lambda _: state
 
 

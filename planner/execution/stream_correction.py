@@ -25,39 +25,39 @@ class FollowedReference:
     """Where the reference is, by the commands that were sent and the readings of the encoder.
 
     Attributes:
-        running: the last command that was sent: when it took effect, and where the reference then was.
+        running: the last command that was sent: its time, and the reference at that time.
     """
 
     def __init__(self, drift_deg: float, drift_filter_s: float, encoder_delay_s: float) -> None:
         """Follow from rest.
 
         Args:
-            drift_deg: how far readings may be from where they were expected before the reference is moved.
-            drift_filter_s: over how long readings are averaged for that.
-            encoder_delay_s: how long after the reference's time in the stream the encoder is at the same angle.
+            drift_deg: maximum deviation of the readings from their prediction; beyond it the reference is shifted.
+            drift_filter_s: averaging time of the readings for this.
+            encoder_delay_s: delay of the encoder behind the reference of the stream.
         """
         self.running: TimedCommand | None = None
         self._drift_deg, self._encoder_delay_s = drift_deg, encoder_delay_s
         self._drift = _Drift(drift_filter_s)
 
     def latest_s(self, timed: TimedCommand) -> float:
-        """Return how late a command may be sent: the one before is good for so much longer than its step."""
+        """Return the maximum delay of a command: the previous one is valid for this much longer than its step."""
         return latest_s((self.running or timed).leg.duration_s)
 
     def sent(self, timed: TimedCommand, late_s: float) -> None:
-        """Take note that the next command was sent, and how late."""
+        """Record that the next command was sent, and its delay."""
         time_s = timed.time_s + max(0.0, late_s)
         there = timed.expected if self.running is None else self.running.reference_at(time_s)
         self.running = timed._replace(time_s=time_s, expected=there)
 
     def encoder_read(self, time_s: float, angle_deg: float) -> None:
-        """Take note of where the encoder was at a time that is known for certain."""
+        """Record the position of the encoder at a time that is known exactly."""
         running = self.running
         if running is not None and (reference_s := time_s - self._encoder_delay_s) >= running.time_s:
             self._drift.take(time_s, angle_deg - running.reference_at(reference_s).angle_deg)
 
     def moved_by_drift(self) -> float:
-        """Move the reference to where the readings have it, if that is far from where it was; return by how much."""
+        """Shift the reference by the deviation of the readings, if that is large; return the shift."""
         drift_deg = self._drift.estimate_deg
         if self.running is None or abs(drift_deg) <= self._drift_deg:
             return 0.0
@@ -71,7 +71,7 @@ class CorrectedStream(FollowedReference):
     """The commands of a motion, one after the other. All times are those of the motion.
 
     Attributes:
-        corrections: where the commands were computed anew.
+        corrections: the points where the commands were computed again.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class CorrectedStream(FollowedReference):
         return None if timed is None else timed.time_s - exchanges_s(wire, timed.command, latched) - wire.latency_s
 
     def sent(self, timed: TimedCommand, late_s: float) -> None:
-        """Take note that the next command was sent, and how late."""
+        """Record that the next command was sent, and its delay."""
         super().sent(timed, late_s)
         self._sent += 1
 

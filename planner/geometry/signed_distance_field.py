@@ -172,7 +172,7 @@ def _digest(mesh: trimesh.Trimesh, spacing_mm: float) -> str:
 
 
 def _load(file: Path) -> SignedDistanceField | None:
-    """Return the stored field, or None where there is none that can be trusted: it is then built anew."""
+    """Return the stored field, or None if there is none that can be trusted: then it is computed again."""
     content = load_file(file)
     if content is None:
         return None

@@ -83,9 +83,9 @@ class Plan:
         speeds_deg_s: (n + 1,) speed at each location.
         accelerations_deg_s2: (n,) acceleration of each step, 0 in a pause.
         cost: Eq. (7) by term.
-        pauses: where the scan stops.
-        waits: where the scan waits at rest, in the order of the locations.
-        computing_time_s: how long planning took, where the caller measured it.
+        pauses: the pauses of the scan.
+        waits: the waits of the scan at rest, in the order of the locations.
+        computing_time_s: duration of planning, if the caller measured it.
     """
 
     planner: str
