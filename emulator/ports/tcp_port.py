@@ -169,7 +169,7 @@ def _is_own_computer(address: str) -> bool:
 def _prepare(client: socket.socket) -> None:
     client.setblocking(False)
     client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    # A client whose machine has failed must not block the table for ever.
+    # A client whose machine has failed must not block the table without end.
     client.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for option, value in (("TCP_KEEPIDLE", 10), ("TCP_KEEPINTVL", 5), ("TCP_KEEPCNT", 3)):
         if hasattr(socket, option):  # not on every system

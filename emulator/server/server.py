@@ -1,7 +1,7 @@
 """The running emulator: one loop that keeps the table at the clock's time and transfers bytes to and from its ports.
 
-The table is advanced only when needed: when a client or a signal arrives, when a byte on the line is due, and
-periodically, so that there is never much to catch up.
+The table is advanced only when needed: when a client or a signal arrives, and when a byte on the line is due. It is
+also advanced periodically, so that there is never much to catch up with.
 """
 
 from collections import deque

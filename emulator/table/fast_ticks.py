@@ -1,8 +1,8 @@
 """Long runs of undisturbed ticks at machine speed, if numba is installed.
 
-A compiled tick takes a hundredth of the time of an interpreted one. But numba has to be imported first (about half a
-second), and the code has to be compiled (some seconds) if no earlier run has stored it. Ticks are interpreted until
-they have cost about as much. So no session takes more than twice the time of the better choice.
+A compiled tick takes a hundredth of the time of an interpreted one. But numba has to be imported first, which takes
+about half a second. The code has to be compiled too (some seconds) if no earlier run has stored it. Ticks are
+interpreted until they have cost about as much. So no session takes more than twice the time of the better choice.
 """
 
 import sys

@@ -1,8 +1,8 @@
 """The scanning cell: the frames, their placements, and the arm's goal for every location and table angle.
 
 Frames: B base of the arm, T table (origin in the middle of its top, z along its axis), W workpiece (turns with the
-table), F flange, S sensor (the probe: origin at the laser's exit, +Z along the beam, +X along the laser line, +Y the
-scan direction). Placements are rigid transformations: `T_BT` is the pose of T in B.
+table), F flange. S sensor is the probe: origin at the laser's exit, +Z along the beam, +X along the laser line, +Y the
+scan direction. Placements are rigid transformations: `T_BT` is the pose of T in B.
 """
 
 from dataclasses import dataclass, field

@@ -70,7 +70,7 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progre
 
     Args:
         scan: the file, or the name.
-        say: called with one line if harmless flaws of the mesh were repaired, and with one line that lists the
+        say: called with one line for each harmless flaw of the mesh that was repaired. It is also called with the
             locations at which the beam does not meet the workpiece.
         progress: see `load_mesh`.
 

@@ -101,9 +101,9 @@ def at_scan_speed(
 def load_scan_path(file: Path, step_s: float) -> ScanPath:
     """Return the path from a CSV or JSON file of poses.
 
-    A pose is six numbers, x y z in mm and yaw pitch roll in degrees, or the sixteen numbers of a 4 x 4 matrix by rows.
-    A CSV file has one pose per line, after an optional header line. A JSON file is a list of poses, where a matrix may
-    also be a list of its rows.
+    A pose is six numbers, x y z in mm and yaw pitch roll in degrees. It may also be the sixteen numbers of a 4 x 4
+    matrix by rows. A CSV file has one pose per line, after an optional header line. A JSON file is a list of poses,
+    where a matrix may also be a list of its rows.
 
     Raises:
         PathError: the file cannot be read, or a pose is not six or sixteen finite numbers, or not rigid.

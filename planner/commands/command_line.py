@@ -306,7 +306,7 @@ def _add_run_on(parser: argparse.ArgumentParser) -> None:
         type=positive_number,
         default=RUN_ON_DEG,
         metavar="DEG",
-        help="maximum angle that the table runs on if the line dies, where the limits allow it (default: %(default)g)",
+        help="maximum angle that the table runs on if the line fails, if the limits allow it (default: %(default)g)",
     )
 
 

@@ -27,7 +27,8 @@ from protocol.trapezoid import MotionCommand, ReferenceState, advance
 # A lower speed counts as standstill: it is a rounding error of sums.
 STANDING_DEG_S = 1e-6
 # Weights relative to an error in deg at the end of a step: half for its middle. An error of the final speed counts as
-# its travel within a third of a step, or within a whole step if the plan leaves no acceleration for a correction.
+# its travel within a third of a step. If the plan leaves no acceleration for a correction, it counts as its travel
+# within a whole step.
 _MIDDLE_WEIGHT = 0.5
 _SPEED_WEIGHT, _SPEED_WEIGHT_AT_LIMIT = 0.3, 1.0
 # Small weight for the braking distance, so that among equal commands the one that stops first is chosen; and an A is

@@ -150,7 +150,7 @@ def execute_commands(
         progress: called with the time of the motion and its end, in ms.
         record: the record to fill, for a caller that reads it during the motion.
     """
-    # The first command's S and A are to be sent in peace.
+    # The S and A of the first command are sent without time pressure.
     preparation_s = 4.0 * exchanges_s(wire, _ANY_COMMAND)
     origin_s = table.clock.now_s() - motion.start_s + settings.lead_s + preparation_s + _PREPARATION_S
     record = record or Record()

@@ -1,7 +1,7 @@
 """The pieces of a motion with one command each: its legs, and parts of legs that are too long for one command.
 
-In a long, fast step with low acceleration, the table would run on far if the line fails (`run_on`), or deviate too much
-from the plan between two locations.
+A long, fast step with low acceleration has two problems. The table would run on far if the line fails (`run_on`). It
+would also deviate too much from the plan between two locations.
 """
 
 import math
@@ -61,8 +61,8 @@ def pieces_of_leg(leg: Leg, limits: Limits, spacing: float, run_on_deg: float) -
 def _follows(leg: Leg, count: int, limits: Limits, run_on_deg: float) -> bool:
     """Return whether pieces of a leg can be followed accurately and with a short run-on.
 
-    With a ramp at A in the middle of a piece of acceleration a and duration T, the deviation from the plan is a T^2 / 8
-    (1 - a / A).
+    Let a piece have the acceleration a and the duration T, and the ramp A in its middle. Then the deviation from the
+    plan is a T^2 / 8 (1 - a / A).
     """
     part_s = leg.duration_s / count
     speed_deg_s = max(abs(leg.start.speed_deg_s), abs(leg.state_at(leg.end_s).speed_deg_s))

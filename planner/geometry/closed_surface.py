@@ -1,8 +1,8 @@
 """Make one closed surface from the triangles of a file: positions define the connections, harmless flaws are repaired.
 
-Repairs do not change the shape of the surface. They concern corners that are written more than once, triangles without
-area or written twice, walls between bodies that share a face, and triangles that are inside out. A hole is not
-repaired.
+Repairs do not change the shape of the surface. They concern corners that are written more than once, and triangles
+without area or written twice. They also concern walls between bodies that share a face, and triangles that are inside
+out. A hole is not repaired.
 """
 
 from typing import NamedTuple

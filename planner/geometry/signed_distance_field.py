@@ -43,8 +43,8 @@ class SignedDistanceField(NamedTuple):
 
     Attributes:
         values_mm: `(n,)` float32, the signed distances at the grids' points, grid after grid, z running fastest.
-        levels: `(n_levels, 7)`, for each grid its first point in the mesh's frame and its spacing, both in mm, and the
-            number of points along x, y and z; the finest grid is first.
+        levels: `(n_levels, 7)`, for each grid its first point in the mesh's frame and its spacing, both in mm, and its
+            size. The size is the number of points along x, y and z. The finest grid is first.
     """
 
     values_mm: NDArray[np.float32]
@@ -68,9 +68,9 @@ NO_FIELD = SignedDistanceField(np.zeros(8, np.float32), np.array([[0.0, 0.0, 0.0
 def build_field(mesh: trimesh.Trimesh, spacing_mm: float, progress: Progress | None = None) -> SignedDistanceField:
     """Return the signed distance field of a watertight mesh. The finest grid extends one cell beyond it on each side.
 
-    The values are exact to the rounding of float32, except at points outside within a thousandth of the spacing of the
-    surface, which count as inside. So no value is above the true one. The nesting of the shells determines the inside
-    (see `planner.geometry.shells`), for any orientation of the triangles.
+    The values are exact to the rounding of float32. The exception are points outside within a thousandth of the spacing
+    of the surface, which count as inside. So no value is above the true one. The nesting of the shells determines the
+    inside (see `planner.geometry.shells`), for any orientation of the triangles.
 
     Args:
         mesh: the mesh, in mm.

@@ -1,12 +1,12 @@
 """Closed-form inverse kinematics of an ortho-parallel arm with a spherical wrist: all eight configurations.
 
-The wrist center determines joints 1 to 3; then the orientation of the flange determines joints 4 to 6. Two choices for
-joint 1 (LEFTY faces the wrist, RIGHTY has its back to it), two for the elbow and two for the wrist give the eight
-solutions.
+The wrist center determines joints 1 to 3; then the orientation of the flange determines joints 4 to 6. There are two
+choices for joint 1 (LEFTY faces the wrist, RIGHTY has its back to it), two for the elbow and two for the wrist.
+Together they give the eight solutions.
 
-For speed, common values of the configurations are computed once, and sines and cosines are computed from the sides of
-the triangle instead of its angles. `inverse` is one long function, because each call passes every array again, which
-costs a fifth of the time.
+For speed, common values of the configurations are computed once. Sines and cosines are computed from the sides of the
+triangle instead of its angles. `inverse` is one long function, because each call passes every array again, which costs
+a fifth of the time.
 """
 
 import math

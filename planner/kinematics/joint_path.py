@@ -32,9 +32,9 @@ def joint_path(
     """Return the joints on continuous turns, within the limits of the arm if possible.
 
     Each step uses the turn nearest to the previous one; between two steps the joints move proportionally. The turn at
-    the start is free (joints 4 and 6 have several). Of the turns that keep the whole path within the limits of a joint,
-    the one is used that brings the path nearest to the middle of its range, or nearest to `before`. If there is none,
-    the one that follows the path farthest is used.
+    the start is free (joints 4 and 6 have several). Several turns may keep the whole path within the limits of a joint.
+    Then the path nearest to the middle of its range is used, or nearest to `before`. If there is none, the one that
+    follows the path farthest is used.
 
     Args:
         arm: joint limits and speeds.

@@ -1,8 +1,8 @@
 """The direction in which a wrist rotates the flange when its joints move proportionally between two solutions.
 
 In the forearm's frame, the wrist rotates the flange by Rz(joint 4) Ry(joint 5) Rz(joint 6). Its unit quaternion
-contains half of each angle, so a whole turn of a joint changes its sign. Therefore the product of the quaternions
-before and after is positive if the flange takes the shorter direction, and negative if it takes the longer one.
+contains half of each angle, so a whole turn of a joint changes its sign. The product of the quaternions before and
+after is positive if the flange takes the shorter direction. It is negative for the longer one.
 """
 
 import math

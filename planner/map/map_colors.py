@@ -41,7 +41,7 @@ class LegendEntry(NamedTuple):
 
 
 def colored(configuration_map: ConfigurationMap) -> tuple[FloatArray, list[LegendEntry]]:
-    """Return the map as an RGB image `(n_angles, n_locations, 3)` and its legend, the most frequent reason first."""
+    """Return the map as an RGB image `(n_angles, n_locations, 3)` and its legend, in descending order of frequency."""
     gray = DARKEST_GRAY + (1.0 - DARKEST_GRAY) * configuration_map.values.T
     image = np.repeat(gray[:, :, None], 3, axis=2)
     reasons = np.zeros(configuration_map.values.shape, dtype=np.uint8)

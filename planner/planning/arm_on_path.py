@@ -16,8 +16,8 @@ class ArmOnPath:
 
     Attributes:
         arm: joint limits and joint speeds.
-        solve: from scan locations (m,) and table angles (m,) in degrees to the joints (m, 6) in radians, each on the
-            turn nearest the middle of its range, and the reasons (m,) of the inverse kinematics.
+        solve: from scan locations (m,) and table angles (m,) in degrees to the joints (m, 6) in radians, and the
+            reasons (m,) of the inverse kinematics. Each joint is on the turn nearest to the middle of its range.
     """
 
     arm: Arm

@@ -1,7 +1,7 @@
 """One backward step of dynamic programming (Bellman's equation): a column's cost-to-go from that of the next column.
 
 Each step connects two speeds of the grid (`transitions.py`). So only the angle, one-dimensional and periodic, is
-interpolated. An interpolated value comes from two finite ones or is infinite, so no finite cost crosses the border of
+interpolated. An interpolated value comes from two finite ones or is infinite. So no finite cost crosses the border of
 the region from which the map can be crossed.
 
 The innermost loop runs along the angle axis: contiguous, without branches or index arithmetic, in single precision.
@@ -20,7 +20,7 @@ from planner.planning.transitions import lay_out_transitions
 from planner.table.cost import speed_cost
 
 # Infinity that keeps its effect with a weight of 0, in single precision. An interpolation with it gives a result far
-# above ANY_COST, which is far above any possible cost of a path in units of the maximum step cost.
+# above ANY_COST. ANY_COST is far above any possible cost of a path, in units of the maximum step cost.
 UNREACHABLE = np.float32(1e30)
 ANY_COST = np.float32(1e12)
 NO_PAUSE = float(UNREACHABLE)

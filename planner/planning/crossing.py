@@ -1,8 +1,8 @@
 """Check whether the table can move from one scan location to the next without touching a forbidden region.
 
 No sub-steps are needed. Strictly between two columns, all four samples around a point have a weight in the bilinear
-look-up. So a step over the angles [lowest, highest] is allowed, at each of its infinitely many sub-steps, exactly if
-every sample is allowed in *both* columns, from the one at or below `lowest` to the one at or above `highest`.
+look-up. So a step over the angles [lowest, highest] is allowed exactly if every sample of that range is allowed in
+*both* columns. The range is from the sample at or below `lowest` to the one at or above `highest`.
 """
 
 import numpy as np

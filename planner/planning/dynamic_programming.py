@@ -20,9 +20,8 @@ from planner.planning.unreachability_proof import first_unreachable_location
 from planner.planning.verification import verify
 from planner.table.motion import Motion
 
-# The first lattice: its minimum number of speeds in each direction, and the share of the maximum speed that it must
-# include, from the preferred to the minimum value; and its maximum number of steps per column, or in total on a short
-# path.
+# The first lattice. Its minimum number of speeds in each direction. The share of the maximum speed that it must
+# include, from the preferred to the minimum value. Its maximum number of steps per column, or in total on a short path.
 SPEEDS = ((8, NEARLY), (8, 0.9), (5, 0.9), (3, 0.8))
 WORK, TOTAL_WORK = 130_000, 13_000_000
 

@@ -2,8 +2,8 @@
 
 The map has no memory, but an arm has: joints 4 and 6 wind up along a path, and joint speeds limit the moves between two
 columns. A move changes each joint in the shorter direction, so it also changes the turn of the joint. It is barred if
-it exceeds a joint's maximum speed, if it ends beyond a joint limit, or if the shorter directions of joints 4 and 6 are
-not the shorter direction of the flange.
+it exceeds a joint's maximum speed, or if it ends beyond a joint limit. It is also barred if the shorter directions of
+joints 4 and 6 are not the shorter direction of the flange.
 """
 
 from itertools import product

@@ -1,9 +1,10 @@
 """The receding horizon planner: plan again at each step, over the columns of the map in view.
 
 For a path that becomes known during the scan. Each step solves the cost-to-go over the columns in view, on a coarser
-grid than the default planner's, and executes the first step of the best motion. Columns beyond the view cost nothing.
-If the columns in view cannot be crossed, the scan must pause. A pause costs more than any motion in view, so the number
-of pauses is minimum. Each pause ends at the angle with the best continuation (Algorithm 1 uses the nearest one).
+grid than the default planner's. Then it executes the first step of the best motion. Columns beyond the view cost
+nothing. If the columns in view cannot be crossed, the scan must pause. A pause costs more than any motion in view, so
+the number of pauses is minimum. Each pause ends at the angle with the best continuation (Algorithm 1 uses the nearest
+one).
 """
 
 from typing import NamedTuple

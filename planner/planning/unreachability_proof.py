@@ -1,10 +1,10 @@
 """Prove that a map cannot be crossed: a superset of the reachable states is empty in some column.
 
-Speeds are grouped into cells. For each column and cell, the angles that any motion within the limits can have there, at
-any speed of the cell, are in a union of intervals. A step widens it by the minimum and maximum travel of a motion from
-one cell to the other. A run of samples that are allowed in both columns clips it. All sets are rounded outward, by far
-more than the allowed deviation of a plan. So if all of them are empty, no motion exists. The converse need not be true,
-because a cell does not store which speed belongs to which angle. Smaller cells are more accurate.
+Speeds are grouped into cells. For each column and cell, consider the angles that any motion within the limits can have
+there, at any speed of the cell. They are in a union of intervals. A step widens it by the minimum and maximum travel of
+a motion from one cell to the other. A run of samples that are allowed in both columns clips it. All sets are rounded
+outward, by far more than the allowed deviation of a plan. So if all of them are empty, no motion exists. The converse
+need not be true, because a cell does not store which speed belongs to which angle. Smaller cells are more accurate.
 """
 
 from typing import NamedTuple

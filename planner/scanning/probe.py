@@ -1,8 +1,8 @@
 """A parametric model of a laser line probe: one laser line, two cameras, no specific product.
 
 Frame S: origin at the laser's exit, +Z along the beam, +X along the line, +Y the scan direction. A point of a profile
-is measured if the laser's ray meets the surface within the range, at an incidence that still reflects light, and at
-least one camera sees the spot. Range is the depth z.
+is measured under three conditions. The laser's ray meets the surface within the range; its incidence still reflects
+light; at least one camera sees the spot. Range is the depth z.
 """
 
 from dataclasses import dataclass

@@ -75,7 +75,7 @@ def views_of(center_B: FloatArray, count: int, probe: LaserProbe) -> FloatArray:
     """Return probe poses `(count, 4, 4)` around the upper side of a sphere, also rotated around their beams.
 
     The sphere is off the middle of the line and at varying depth. Otherwise a probe that rotates around its beam would
-    always measure the same, and at constant depth a rotation of the probe looks like a shift.
+    always measure the same. At constant depth, a rotation of the probe looks like a shift.
     """
     number = np.arange(count)
     azimuth, polar = np.radians(137.508 * number), np.radians(10.0 + 60.0 * (number + 0.5) / count)

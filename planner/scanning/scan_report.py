@@ -92,10 +92,11 @@ def _distances(budget: ErrorBudget) -> tuple[str, ...]:
 def _explanation(scanned: Scanned) -> str:
     text = (
         "The same profiles, aligned again with one contribution only, and with all but one. Displacement is the"
-        " distance of a point from its true position on the part. Its perpendicular component is visible as a distance from the"
-        " mesh. If a surface is round around the table's axis, or perpendicular to it, a wrong angle moves its points"
-        " along the surface, and the distance does not show this. Contributions may depend on one another, such as a"
-        " constant backlash and the rounding of the same angle. Then the sum of the squares differs from the total."
+        " distance of a point from its true position on the part. Its perpendicular component is visible as a distance"
+        " from the mesh. A surface may be round around the table's axis, or perpendicular to it. Then a wrong angle"
+        " moves its points along the surface, and the distance does not show this. Contributions may depend on one"
+        " another, such as a constant backlash and the rounding of the same angle. Then the sum of the squares differs"
+        " from the total."
     )
     if not scanned.run.tells_truth:
         text += " This port does not provide the true angle of the table, so the table's own contributions are missing."

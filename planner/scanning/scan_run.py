@@ -145,8 +145,8 @@ def run_on_port(planned: RunInput, options: ScanOptions, progress: ProgressOf) -
     """Return the values latched while the table at the port executed the motion.
 
     Raises:
-        PlannerError: the port allows no trigger, the serial line is too slow for the commands, the run-up or the stop
-            would cross a forbidden region, or nothing was scanned.
+        PlannerError: the port allows no trigger, the serial line is too slow for the commands, or nothing was scanned.
+            Also if the run-up or the stop would cross a forbidden region.
         TableError: the table does not reply, or did not reach the start.
     """
     wire = Wire(options.decimals, options.baud)

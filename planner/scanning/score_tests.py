@@ -49,7 +49,7 @@ class NormalEquations(NamedTuple):
 
 
 class Change(NamedTuple):
-    """The most significant change in a series of groups.
+    """The change with the highest significance in a series of groups.
 
     Attributes:
         kind: "drift", "step" or "outlier".

@@ -19,7 +19,7 @@ _CALM_S = 1.0
 
 
 class Watch(Protocol):
-    """What a session needs to know about the machine that it runs on."""
+    """Data of the machine that a session runs on."""
 
     def restart(self) -> None:
         """Reset the maximum delay."""

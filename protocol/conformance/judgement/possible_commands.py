@@ -32,9 +32,9 @@ def certain_command(line: bytes) -> Command | None:
 def possible_commands(line: bytes) -> Iterator[Command]:
     """Yield the settings and motions that another table may read in a line that this protocol refuses.
 
-    Another table may accept lowercase letters, start within the line, end lines at LF, clear the eighth bit, skip bytes
-    that do not belong to a number, or stop at the first of them. It may also read exponents, commas and hexadecimal
-    numbers.
+    Another table may accept lowercase letters, start within the line, end lines at LF, or clear the eighth bit. It may
+    skip bytes that do not belong to a number, or stop at the first of them. It may also read exponents, commas and
+    hexadecimal numbers.
     """
     text = bytes(byte & 0x7F for byte in line).decode("ascii")
     for index, letter in enumerate(text):
