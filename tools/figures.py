@@ -1,10 +1,10 @@
 """Reproduce the paper's figures of the planner: `python -m tools.figures [--out DIR] [NAME...]`.
 
-Fig. 5 is the shape of Eq. (1), Fig. 6 a configuration map with a plan in both views, Fig. 7 the reference found by
-Dijkstra's algorithm, Fig. 8 ray shooting at four moments and Fig. 9 its speed and acceleration.
+Fig. 5 is the shape of Eq. (1), Fig. 6 a configuration map with a plan in both views. Fig. 7 is the reference found by
+Dijkstra's algorithm. Fig. 8 is ray shooting at four times, and Fig. 9 its speed and acceleration.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the imports that take long
+import protocol.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -42,8 +42,8 @@ from protocol.ending import ended
 JOINT_RANGE_DEG = (-170.0, 170.0)
 EXPONENTS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 
-# Fig. 6, 7 and 9 share one map. Each step of the graph of Fig. 7 ends exactly on a node, so that the path in the graph
-# is also what the table does. It has 10 speeds each way, up to the limit itself.
+# Fig. 6, 7 and 9 share one map. Each step of the graph of Fig. 7 ends exactly on a node, so that the table can execute
+# the path in the graph. It has 10 speeds in each direction, including the limit itself.
 SHARED_FAMILY, SHARED_SEED = MapFamily(0.42, 6.0, 0.3), 11
 SHARED_STEP_S, SHARED_LIMITS = 0.5, Limits(36.0, 36.0)
 SHARED_SPEED_COUNT, SHARED_WORK = 10, 100_000
@@ -56,13 +56,13 @@ OBSTACLE_RAYS = Rays(31, 62)
 
 
 def shared_problem() -> Problem:
-    """Return the problem of Fig. 6, 7 and 9; it starts where the best plan does."""
+    """Return the problem of Fig. 6, 7 and 9; it has the start of the best plan."""
     free = Problem(synthetic_map(SHARED_FAMILY, SHARED_SEED), SHARED_STEP_S, SHARED_LIMITS)
     return replace(free, start_angle_deg=float(_plan(dynamic_programming(free)).angles_deg[0]))
 
 
 def obstacle_problem() -> Problem:
-    """Return the problem of Fig. 8: at first the only way in sight is left of (below) both obstacles."""
+    """Return the problem of Fig. 8: at first, the only visible path is left of (below) both obstacles."""
     return Problem(
         blocks_map(96, 120, OBSTACLES, OBSTACLES_EDGE),
         step_s=0.2,
@@ -117,7 +117,7 @@ def figure_7() -> Figure:
 
 @styled()
 def figure_8() -> Figure:
-    """Ray shooting at four moments: a way below both obstacles first, then one between them, which is cheaper."""
+    """Ray shooting at four times: first a path below both obstacles, then one between them, which is cheaper."""
     problem = obstacle_problem()
     plan = _plan(ray_shooting(problem, OBSTACLE_RAYS))
     figure = new_figure(7.4, 10.5)
@@ -177,7 +177,7 @@ def _draw_map(axes: Axes, configuration_map: ConfigurationMap) -> AxesImage:
 
 
 def _draw_cylinder(axes: Axes3D, configuration_map: ConfigurationMap, angles_deg: FloatArray) -> None:
-    """Draw the map on a cylinder along the scan path, turned so that the path faces the reader."""
+    """Draw the map on a cylinder along the scan path, rotated so that the path faces the viewer."""
     elevation, azimuth = np.radians(25.0), np.radians(-62.0)
     towards_reader = np.arctan2(np.sin(elevation), np.sin(azimuth) * np.cos(elevation))
     offset = towards_reader - np.radians(0.5 * (angles_deg.min() + angles_deg.max()))
@@ -197,7 +197,7 @@ def _draw_cylinder(axes: Axes3D, configuration_map: ConfigurationMap, angles_deg
 
 
 def _draw_rays(axes: Axes, problem: Problem, plan: Plan, moment: int) -> None:
-    """Draw each ray from the state at a moment, as far as it is allowed; the chosen one in the plan's color."""
+    """Draw each ray from the state at a time, as far as it is allowed; the chosen one in the plan's color."""
     accelerations = ray_accelerations(OBSTACLE_RAYS.rays, problem.limits.acceleration_deg_s2)
     state = float(plan.angles_deg[moment]), float(plan.speeds_deg_s[moment])
     empty = no_cost_to_go(problem)
@@ -225,7 +225,7 @@ def _ray(problem: Problem, acceleration: float, column: int, angle_deg: float, s
 
 
 def complete_rays(problem: Problem, plan: Plan, moment: int) -> list[list[float]]:
-    """Return the rays from the plan's state at a moment that stay allowed up to their horizon."""
+    """Return the rays from the plan's state at a time that stay allowed up to their horizon."""
     accelerations = ray_accelerations(OBSTACLE_RAYS.rays, problem.limits.acceleration_deg_s2)
     state = float(plan.angles_deg[moment]), float(plan.speeds_deg_s[moment])
     rays = [_ray(problem, float(acceleration), moment, *state) for acceleration in accelerations]
@@ -242,14 +242,16 @@ FIGURES: Mapping[str, Callable[[], Figure]] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw the figures asked for and print the files written."""
+    """Draw the requested figures and print the names of the files."""
     parser = Parser(
         prog=program_name("tools.figures"),
         description="Reproduce Fig. 5 to 9 of the paper.",
         epilog="example: python -m tools.figures --out build/figures fig8",
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"which figures (default: {' '.join(FIGURES)})")
-    parser.add_argument("--out", type=Path, default=Path("figures"), metavar="DIR", help="where to (default: figures)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("figures"), metavar="DIR", help="output folder (default: figures)"
+    )
     options = parser.parse_args(arguments)
     unknown = [name for name in options.names if name not in FIGURES]
     if unknown:

@@ -1,10 +1,10 @@
-"""Identify a table: record the right motion over a port, and estimate the constants from a recording.
+"""Identify a table: record a suitable motion over a port, and estimate the constants from a recording.
 
 python -m tools.identify record --port emulator:// --out trace.csv
 python -m tools.identify fit trace.csv --out table.toml
 """
 
-import protocol.quiet_start  # noqa: F401 - before the imports that take long
+import protocol.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -97,12 +97,10 @@ def _fit(options: argparse.Namespace) -> int:
 
 
 def _check_distinct(paths: list[Path]) -> None:
-    """Refuse to write over what is read, or the report over the constants."""
+    """Refuse to overwrite an input, or the constants with the report."""
     for path in paths:
         if [other.resolve() for other in paths].count(path.resolve()) > 1:
-            raise RecordingError(
-                f"{path} would be written over; --out must be another file, and its name not end in .html"
-            )
+            raise RecordingError(f"{path} would be overwritten; --out must be another file that does not end in .html")
 
 
 def parser() -> Parser:
@@ -130,7 +128,11 @@ def parser() -> Parser:
     fitter = commands.add_parser("fit", help=summary, description=summary)
     fitter.add_argument("recording", type=Path, help="a CSV of `record`, of the emulator's trace, or of a drive")
     fitter.add_argument(
-        "--out", required=True, type=Path, metavar="FILE", help="TOML file to write; the report is written beside it"
+        "--out",
+        required=True,
+        type=Path,
+        metavar="FILE",
+        help="TOML file to write; the report is written to the same folder",
     )
     fitter.add_argument(
         "--config", type=Path, help="known constants: gains, encoder, datasheet (default: the default table)"

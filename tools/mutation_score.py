@@ -1,11 +1,12 @@
-"""Mutation testing: which small faults in the code do the tests not see?
+"""Mutation testing: small faults in the code that the tests do not find.
 
-`python -m tools.mutation_score --seed N --count N` (`make mutants`) draws mutants of the modules below, and plants each
-in a copy of the tree. It runs the tests that mirror the module, then those of the folder. It prints the mutants that
-survive, and the share that was killed. A mutant that may survive is listed with its reason in `mutation_score.toml`.
+`python -m tools.mutation_score --seed N --count N` (`make mutants`) draws mutants of the modules below, and applies
+each to a copy of the tree. It runs the tests that mirror the module, then those of the folder. It prints the mutants
+that survive, and the share that was killed. A mutant that may survive is listed with its reason in
+`mutation_score.toml`.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the imports that take long
+import protocol.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -49,7 +50,7 @@ _PYTEST = ("-m", "pytest", "-q", "-x", "-m", "not realtime", "-p", "no:cacheprov
 
 
 class Score(NamedTuple):
-    """What became of the mutants that were drawn."""
+    """The results of the drawn mutants."""
 
     killed: int
     explained: int
@@ -57,19 +58,19 @@ class Score(NamedTuple):
 
     @property
     def share(self) -> float:
-        """The share that was killed of those without a reason to survive."""
+        """The killed share of those without a reason to survive."""
         return self.killed / max(1, self.killed + len(self.survivors))
 
 
 def mutated_modules() -> list[str]:
-    """Return the full names of the modules that are mutated, in order."""
+    """Return the full names of the mutated modules, in order."""
     sources = [source for folder in FOLDERS for source in sorted((ROOT / folder).glob("*.py"))]
     names = (source.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".") for source in sources)
     return [name for name in names if not name.endswith(("__init__", "_plots", "_report"))]
 
 
 def mirroring_tests(module: str) -> list[list[str]]:
-    """Return the tests of a module, from the nearest on: those that mirror it, then those of its folder."""
+    """Return the tests of a module, nearest first: those that mirror it, then those of its folder."""
     *folders, name = module.split(".")
     folder = Path("tests", *folders)
     nearest = [str(file.relative_to(ROOT)) for file in sorted((ROOT / folder).glob(f"test_{name}*.py"))]
@@ -77,7 +78,7 @@ def mirroring_tests(module: str) -> list[list[str]]:
 
 
 def is_killed(mutation: Mutation, tree: Path) -> bool:
-    """Plant a mutation in a copy of the tree, and return whether a test fails; the copy is whole again after that."""
+    """Apply a mutation to a copy of the tree, and return whether a test fails; the copy is restored after that."""
     file = Path(*mutation.module.split(".")).with_suffix(".py")
     (tree / file).write_text(mutated_source(mutation), encoding="utf-8")
     try:
@@ -87,7 +88,7 @@ def is_killed(mutation: Mutation, tree: Path) -> bool:
 
 
 def score(mutations: Sequence[Mutation], jobs: int, reasons: dict[str, str]) -> Score:
-    """Return what becomes of mutations, several at a time."""
+    """Return the results of mutations, several at a time."""
     killed = explained = 0
     survivors: list[Mutation] = []
     with share_shown("mutants") as progress:
@@ -104,7 +105,7 @@ def score(mutations: Sequence[Mutation], jobs: int, reasons: dict[str, str]) -> 
 
 
 def identity(mutation: Mutation) -> str:
-    """Return what names a mutation where lines move: its function and its change."""
+    """Return the identity of a mutation, independent of line numbers: its function and its change."""
     return f"{mutation.where}: {mutation.change}"
 
 
@@ -149,7 +150,7 @@ def _copies(count: int) -> Iterator[list[Path]]:
 
 
 def _pass(tests: Sequence[str], tree: Path) -> bool:
-    """Return whether tests pass; those that hang fail. Status 5 means that there are none."""
+    """Return whether tests pass; tests that hang fail. Status 5 means that there are none."""
     environment = os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
         done = subprocess.run(
@@ -167,7 +168,7 @@ def _pass(tests: Sequence[str], tree: Path) -> bool:
 
 def _run(options: argparse.Namespace) -> int:
     everything = mutations_of(mutated_modules())
-    chosen = Random(options.seed).sample(everything, min(options.count, len(everything)))  # noqa: S311 - no secret
+    chosen = Random(options.seed).sample(everything, min(options.count, len(everything)))  # noqa: S311 - not for security
     found = score(chosen, options.jobs, known_reasons())
     survived = Counter(mutation.module for mutation in found.survivors)
     for module, drawn in sorted(Counter(mutation.module for mutation in chosen).items()):
@@ -178,7 +179,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line, and return the exit status: 1 if fewer mutants are killed than wanted."""
+    """Run the command line, and return the exit status: 1 if fewer mutants are killed than required."""
     parser = Parser(
         prog=program_name("tools.mutation_score"),
         description="random mutants of firmware, plant, line and planner that the tests do not kill",

@@ -1,9 +1,9 @@
 """Draw a trace of the emulator: `python -m tools.plot_trace TRACE --out FILE.png`.
 
-From top to bottom: reference and measured speed with the commands that made them, position, and what the motor did.
+From top to bottom: reference and measured speed with their commands, position, and the state of the motor.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the imports that take long
+import protocol.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -35,11 +35,11 @@ Of commands close together the first ones are labeled, with the number of the ot
 _HEIGHT_IN = 7.5
 _THIN, _WIDE = 0.9, 4.0
 _LEGEND_SHARE = 0.25
-"""Room above the curves for a legend, as a share of their range."""
+"""Space above the curves for a legend, as a share of their range."""
 
 
 class Signal(NamedTuple):
-    """How a column of the trace is drawn."""
+    """The style of a column of the trace."""
 
     label: str
     color: str
@@ -48,7 +48,7 @@ class Signal(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """Axes with the signals that may stand in them, by column, in the order in which they are drawn."""
+    """Axes with their possible signals, by column, in drawing order."""
 
     ylabel: str
     height: float
@@ -92,17 +92,17 @@ def draw_trace(
     """Return the figure of a trace.
 
     Args:
-        trace: A run of at least one tick.
-        title: Stands above the figure.
-        from_s: Start of what is drawn; the trace's start by default.
-        to_s: End of what is drawn; the trace's end by default.
-        signals: Columns of the trace, of `SIGNALS`.
+        trace: a run of at least one tick.
+        title: title of the figure.
+        from_s: start of the drawn part; default: the trace's start.
+        to_s: end of the drawn part; default: the trace's end.
+        signals: columns of the trace, from `SIGNALS`.
 
     Raises:
-        ValueError: The trace is empty, no part of it lies between the times, or a signal is not known.
+        ValueError: the trace is empty, none of it is between the times, or a signal is unknown.
     """
     if not len(trace.time_s):
-        raise ValueError(f"{title}: the trace holds no tick; record it until something has happened")
+        raise ValueError(f"{title}: the trace contains no tick; record a longer one")
     _check_signals(signals)
     rows, (begin_s, end_s) = _selection(trace, from_s, to_s)
     panels = [panel for panel in _PANELS if not panel.signals.keys().isdisjoint(signals)]
@@ -129,7 +129,7 @@ def _check_signals(signals: tuple[str, ...]) -> None:
 
 
 def _selection(trace: Trace, from_s: float | None, to_s: float | None) -> tuple[slice, tuple[float, float]]:
-    """Return the rows to draw, with a neighbor at each end as nothing changes in between, and the time's limits."""
+    """Return the rows to draw, with a neighbor at each end, and the limits of the time."""
     first_s, last_s = float(trace.time_s[0]), float(trace.time_s[-1])
     begin_s, end_s = first_s if from_s is None else from_s, last_s if to_s is None else to_s
     for name, value in (("--from", begin_s), ("--to", end_s)):
@@ -140,7 +140,7 @@ def _selection(trace: Trace, from_s: float | None, to_s: float | None) -> tuple[
     limits_s = max(begin_s, first_s), min(end_s, last_s)
     if limits_s[0] >= limits_s[1] and (from_s, to_s) != (None, None):
         raise ValueError(
-            f"no part of the trace lies within {begin_s:g} to {end_s:g} s; it runs from {first_s:g} to {last_s:g} s"
+            f"no part of the trace is within {begin_s:g} to {end_s:g} s; it runs from {first_s:g} to {last_s:g} s"
         )
     first = int(np.searchsorted(trace.time_s, begin_s, side="right")) - 1
     last = int(np.searchsorted(trace.time_s, end_s))

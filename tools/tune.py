@@ -4,15 +4,15 @@
     python -m tools.tune --config table.toml --ms 1.6 --noise 0.3 --out build/tune
     python -m tools.tune --judge gains.toml --out build/judge
 
-Writes gains.toml (for `python -m emulator --config`), gains.h, figures.json, report.html and its plots. Where no gains
-keep all bounds, it writes all but gains.toml and gains.h, prints a command line that works, and ends with status 2.
+Writes gains.toml (for `python -m emulator --config`), gains.h, figures.json, report.html and its plots. If no gains
+satisfy all bounds, it writes all but gains.toml and gains.h, prints a command line that works, and ends with status 2.
 
-With --judge no gains are searched: the same report is written for the gains of a file, whether the bounds hold or not.
-Its [gains.ramp] and [gains.hold] have proportional_duty_s_deg, integral_time_s and derivative_time_s. The exit status
-is 0 if all bounds hold, 1 if not, and 2 for an input that cannot be used.
+With --judge no gains are searched: the same report is written for the gains of a file, whether they satisfy the bounds
+or not. Its [gains.ramp] and [gains.hold] have proportional_duty_s_deg, integral_time_s and derivative_time_s. The exit
+status is 0 if all bounds are satisfied, 1 if not, and 2 for invalid input.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the imports that take long
+import protocol.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -79,16 +79,16 @@ def _judge(options: argparse.Namespace) -> int:
 
 
 def _refusal(tuning: Tuning, options: argparse.Namespace) -> str:
-    """Return which bounds cannot be kept, and a command line that works."""
+    """Return which bounds cannot be satisfied, and a command line that works."""
     sets = [
         f"the {tuned.title} breaks {', '.join(map(tuned.design.stated, tuned.design.broken))}"
         for tuned in tuning.sets.values()
         if tuned.design.broken
     ]
-    way = "no command line was found that works"
+    way = "no working command line was found"
     if tuning.eased is not None:
         way = f"this works: {_command_line(options, tuning.eased)}"
-    return f"no gains keep all bounds; of the nearest {' and '.join(sets)}; {way}"
+    return f"no gains satisfy all bounds; of the nearest {' and '.join(sets)}; {way}"
 
 
 def _command_line(options: argparse.Namespace, limits: Limits) -> str:

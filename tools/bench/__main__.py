@@ -1,4 +1,4 @@
-"""Benchmarks: every figure beside a peer that runs in the same minute on the same machine.
+"""Benchmarks: every figure is compared with a reference that runs in the same minute on the same machine.
 
 python -m tools.bench emulator map
 python -m tools.bench identify --pty
@@ -18,7 +18,8 @@ SUBJECTS = ("calibration", "emulator", "identify", "map", "planner", "scan", "st
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the named benchmarks and print their tables."""
     options = _parser().parse_args(arguments)
-    # Each needs libraries that the others do not. An interrupt must not break into the import of compiled ones.
+    # Each benchmark needs libraries that the others do not. An interrupt must not occur during the import of compiled
+    # ones.
     benches = {subject: import_module(f"tools.bench.{subject}").bench for subject in options.subject}
     return ended("bench", lambda: _run(options, benches))
 

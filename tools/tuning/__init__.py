@@ -1,6 +1,6 @@
 """Gain tuning: the speed loop as python-control systems, gain design within bounds, and checks on the emulator.
 
-The names below are the public interface; docs/tuning.md, "In Python", shows their use.
+The names below are the public interface; docs/tuning.md, "In Python", shows how to use them.
 """
 
 from emulator.config.table_config import GainsConfig

@@ -1,4 +1,4 @@
-"""The bounds that a gain set must keep, and how far it is from each."""
+"""The bounds for a gain set, and its distance from each."""
 
 from math import ceil, floor, isinf, log10
 from typing import NamedTuple
@@ -18,12 +18,12 @@ class Bound(NamedTuple):
     title: str
     limit: float
     at_most: bool
-    scale: float  # from the figure's unit to the one that is shown
+    scale: float  # conversion from the figure's unit to the displayed one
     unit: str
-    flag: str  # of the command line, in the unit that is shown
+    flag: str  # option of the command line, in the displayed unit
 
     def excess(self, figures: LoopFigures) -> Array:
-        """Return how far the figure is beyond the limit, as a share of it; negative where the bound is kept."""
+        """Return by how much the figure exceeds the limit, as a share of it; negative if the bound is satisfied."""
         value = getattr(figures, self.figure)
         share: Array = value / self.limit - 1.0 if self.at_most else 1.0 - value / self.limit
         return share
@@ -35,7 +35,7 @@ class Bound(NamedTuple):
         return f"{value * self.scale:.3g}{self.unit}"
 
     def allowing(self, value: float) -> float:
-        """Return a limit of two digits that the value keeps with a little to spare."""
+        """Return a limit of two digits that the value satisfies with a small margin."""
         eased = value * (1.0 + _EASE if self.at_most else 1.0 - _EASE)
         power = 10.0 ** (floor(log10(abs(eased))) - 1)
         return float((ceil if self.at_most else floor)(eased / power) * power)
@@ -47,11 +47,11 @@ class Bound(NamedTuple):
 
     @property
     def asked(self) -> str:
-        """The limit in words."""
+        """The limit as text."""
         return f"{'at most' if self.at_most else 'at least'} {self.shown(self.limit)}"
 
     def __str__(self) -> str:
-        """Return the bound in words."""
+        """Return the bound as text."""
         return f"{self.title} {self.asked}"
 
 
@@ -77,7 +77,7 @@ class Limits(NamedTuple):
         )
 
     def for_hold(self) -> tuple[Bound, ...]:
-        """Return the bounds of the constant-speed set: those of the ramp set, and a clean step answer."""
+        """Return the bounds of the constant-speed set: those of the ramp set, and a well-damped step response."""
         return (
             *self.for_ramp(),
             Bound("overshoot", "overshoot", self.overshoot, True, 100.0, " %", "--overshoot"),
@@ -86,7 +86,7 @@ class Limits(NamedTuple):
 
 
 def violation(bounds: tuple[Bound, ...], figures: LoopFigures) -> Array:
-    """Return the sum of all excesses: 0 where all bounds are kept; an unstable loop keeps none."""
+    """Return the sum of all excesses: 0 if all bounds are satisfied; an unstable loop satisfies none."""
     total = np.sum([np.maximum(bound.excess(figures), 0.0) for bound in bounds], axis=0)
     result: Array = np.where(figures.stable, total, np.inf)
     return result

@@ -1,4 +1,4 @@
-"""Tables of a tuning's report that compare: bounds on the noise with each other, and the sets with textbook rules."""
+"""Comparison tables of a tuning report: bounds on the noise, and textbook rules."""
 
 from collections.abc import Mapping, Sequence
 
@@ -24,7 +24,7 @@ _FIGURES = (
 
 
 def trade_table(trades: Sequence[Trade], limits: Limits) -> str:
-    """Return the table of what each bound on the noise gives."""
+    """Return the table of the results for each bound on the noise."""
     rows = [_trade_row(trade, limits) for trade in trades]
     head = ("--noise (% duty)", "lag on a ramp (ms)", "load peak (deg/s per Nm)", "creep ripple (deg/s)", "")
     return table(head, rows)

@@ -1,4 +1,4 @@
-"""The report of a tuning: what came out, why it is bounded there, and how model and emulator agree."""
+"""The report of a tuning: the results, their binding bounds, and the agreement of model and emulator."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from tools.tuning.tuned_table import JUDGED, TunedSet, Tuning, Words
 from tools.tuning.way_out import changes
 
 _SAME_SHARE = 0.05
-"""Answers on the emulator that differ by less are as good as each other: so much depends on where the counts lie."""
+"""Emulator results with a smaller difference count as equal: the position of the counts has this effect."""
 
 
 def tune_report(tuning: Tuning, drawings: dict[str, str], origin: Origin | None = None) -> str:
@@ -33,7 +33,7 @@ def tune_report(tuning: Tuning, drawings: dict[str, str], origin: Origin | None 
             details("Spread of the plant", _spread_section(tuning, drawings)),
             details("What the bound on the noise costs", _trade_section(tuning)),
             details("Textbook rules", _textbook_section(tuning)),
-            details("What the model takes as noise", paragraph(_noise(tuning))),
+            details("Quantization noise in the model", paragraph(_noise(tuning))),
         ],
         origin,
     )
@@ -56,18 +56,18 @@ def _change(old: float, new: float) -> str:
 
 
 def verdict(tuning: Tuning) -> str:
-    """Return in a sentence whether the bounds hold: which are binding, or which are broken and by what."""
+    """Return in a sentence whether the bounds are satisfied: which are binding, or which are violated and by what."""
     if tuning.feasible:
         parts = [f"{tuned.title}: bounded by {_names(tuned.design.binding)}" for tuned in tuning.sets.values()]
-        return f"Both sets keep all bounds ({'; '.join(parts)})."
+        return f"Both sets satisfy all bounds ({'; '.join(parts)})."
     parts = [f"the {tuned.title} {_broken(tuned.design)}" for tuned in tuning.sets.values() if tuned.design.broken]
     if tuning.words == JUDGED:
-        return f"Not all bounds hold: {'; '.join(parts)}."
+        return f"Not all bounds are satisfied: {'; '.join(parts)}."
     way = ""
     if tuning.eased is not None:
         options = " ".join(after.option for _, after in changes(tuning.limits, tuning.eased))
-        way = f" With {options} both sets keep all bounds."
-    return f"No gains keep all bounds: {'; '.join(parts)}.{way} This report judges the nearest gains."
+        way = f" With {options} both sets satisfy all bounds."
+    return f"No gains satisfy all bounds: {'; '.join(parts)}.{way} This report judges the nearest gains."
 
 
 def _broken(design: Design) -> str:
@@ -141,13 +141,13 @@ def _frequency_section(drawings: dict[str, str]) -> str:
     ) + figure(
         drawings["nyquist"],
         "The loop in the complex plane, for both gain sets.",
-        "Nyquist plots; the circle is what the bound on Ms keeps free about -1.",
+        "Nyquist plots; the circle around -1 is excluded by the bound on Ms.",
     )
 
 
 def _spread_section(tuning: Tuning, drawings: dict[str, str]) -> str:
     text = (
-        f"{tuning.plants:,} tables whose constants lie uniformly within "
+        f"{tuning.plants:,} tables whose constants are uniformly distributed within "
         f"{100 * tuning.spread:.0f} % about the configured ones."
     )
     caption = (

@@ -70,7 +70,7 @@ def without_a_move(recording: WireRecording) -> WireRecording:
         (lambda recording: on_clock(recording, gathered(0.016), lines_too=False), "on a grid of 16 ticks"),
         (lambda recording: on_clock(recording, gathered(0.002), lines_too=False), "on a grid of 2 ticks"),
         (doubled, "readings are doubled"),
-        (without_a_move, "moves though no command sends it: a P or R command is missing"),
+        (without_a_move, "moves without a command: a P or R command is missing"),
         # An integer number of ticks leaves no trace in the replies' phase: the fit must find it.
         (lambda recording: on_clock(recording, jumping(0.02, 32.0)), "the model does not explain the recording"),
     ],
