@@ -94,7 +94,7 @@ class PoseLines:
         number = sent["location"]
         if number != self._count or isinstance(number, bool):
             what = "repeats a location" if isinstance(number, int) and number < self._count else "leaves locations out"
-            raise SourceError(f"{where} {what}: its number is {shown(str(number))}; the next one is {self._count}")
+            raise SourceError(f"{where} {what}: its number is {shown(str(number))}; the next is {self._count}")
         return sent["pose"]
 
     def _add(self, where: str, text: str, sent: object) -> None:

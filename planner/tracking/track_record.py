@@ -41,6 +41,10 @@ class TrackRecord:
         self.moments: list[Step] = []
         self._steps, self._stride = 0, 1
 
+    def close(self) -> None:
+        """Let the columns go."""
+        self._file.close()
+
     def revealed(self, column: Column) -> None:
         """Take note of a column; one that is known already replaces the earlier one."""
         self._angle_count = len(column.values)

@@ -1,6 +1,7 @@
 """A short scan to track, and the locations of its path as a program sends them."""
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from planner.arrays import FloatArray
 from planner.cell.scan import Scan, load_scan
 from planner.defaults import SCANS
 from planner.geometry.transforms import to_xyz_yaw_pitch_roll
+from planner.kinematics.arm import Arm
 from planner.kinematics.configuration import Configuration
 from planner.map.map_problem import map_problem
 from planner.table.wire import Wire
@@ -50,24 +52,20 @@ def write_scan(folder: Path, step_s: float = 0.5) -> Path:
     return file
 
 
-def new_tracker(wire: Wire | None = None, step_s: float | None = None, **settings: object) -> Tracker:
+def new_tracker(view: int = 8, step_s: float | None = None, arm: Arm | None = None) -> Tracker:
     """Return a tracker of the cylinder in one configuration, on a coarse map."""
-    scan = cylinder()
+    scan, problem = cylinder(), map_problem(cylinder())
+    if arm is not None:
+        problem = replace(problem, cell=replace(problem.cell, arm=arm))
+    settings = TrackSettings(view=view)
     return Tracker(
-        map_problem(scan),
-        step_s or scan.path.step_s,
-        scan.limits,
-        scan.weights,
-        wire,
-        TrackSettings(**settings),  # type: ignore[arg-type] # a test's own fields
-        [CONFIGURATION],
-        ANGLES,
+        problem, step_s or scan.path.step_s, scan.limits, scan.weights, Wire(), settings, [CONFIGURATION], ANGLES
     )
 
 
-def begun_tracker(T_WS: FloatArray, **settings: object) -> Tracker:
+def begun_tracker(T_WS: FloatArray, view: int = 8, arm: Arm | None = None) -> Tracker:
     """Return a tracker that rests at the start and knows its first view."""
-    tracker = new_tracker(**settings)
+    tracker = new_tracker(view, arm=arm)
     for T in T_WS[: tracker.room]:
         tracker.reveal(T)
     if tracker.count == len(T_WS):
@@ -87,7 +85,7 @@ def asked(tracker: Tracker) -> Tracked | None:
 
 def steps_to_the_end(tracker: Tracker, T_WS: FloatArray) -> list[Step]:
     """Track a path whose locations come as soon as there is room, and return the steps."""
-    steps = []
+    steps: list[Step] = []
     while True:
         for T in T_WS[tracker.count : tracker.count + tracker.room]:
             tracker.reveal(T)
