@@ -6,12 +6,12 @@ from typing import Protocol
 
 from planner.execution.run_record import Correction
 from planner.execution.stream import TimedCommand
-from planner.table.velocity_profile import MotionCommand
 from planner.table.wire import Wire
 from planner.tracking.online_planner import Why
 from planner.tracking.pose_lines import SourceError
 from planner.tracking.pose_source import PoseSource
 from planner.tracking.tracker import Column, Tracked, Tracker
+from protocol.trapezoid import MotionCommand
 
 # So many new columns are rated before one decision, so that a burst of locations does not make it late.
 _COLUMNS_A_STEP = 4

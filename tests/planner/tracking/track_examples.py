@@ -10,7 +10,6 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.cell.scan import Scan, load_scan
 from planner.defaults import SCANS
-from planner.geometry.transforms import to_xyz_yaw_pitch_roll
 from planner.kinematics.arm import Arm
 from planner.kinematics.configuration import Configuration
 from planner.map.map_problem import map_problem
@@ -36,13 +35,13 @@ def locations(count: int = LOCATIONS) -> FloatArray:
 
 def lines(T_WS: FloatArray, end: bool = True) -> list[str]:
     """Return locations as a program sends them."""
-    sent = [json.dumps(row) for row in to_xyz_yaw_pitch_roll(T_WS).tolist()]
+    sent = [json.dumps(row) for row in T_WS.reshape(-1, 16).tolist()]
     return [*sent, '"end"'] if end else sent
 
 
 def write_scan(folder: Path, step_s: float = 0.5) -> Path:
     """Write a scan of the first locations, and return its file."""
-    rows = to_xyz_yaw_pitch_roll(locations()).tolist()
+    rows = locations().reshape(-1, 16).tolist()
     (folder / "path.csv").write_text("\n".join(",".join(map(repr, row)) for row in rows) + "\n", encoding="utf-8")
     text = (SCANS / "cylinder.toml").read_text(encoding="utf-8")
     before, _, after = text.partition("[path]")
