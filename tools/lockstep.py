@@ -41,7 +41,20 @@ TABLES: Mapping[str, str] = MappingProxyType(
 )
 """The tables that both are compared at, as the keys of a configuration that differ from the default one."""
 
-_NONSENSE = (b"Q", b"P 1e5", b"\x18", b"P" + b" " * 40, b"", b"h", b"S 0", b"A -1", b"R 1.", b"P 4194304", b"\xff 3", b"H1")
+_NONSENSE = (
+    b"Q",
+    b"P 1e5",
+    b"\x18",
+    b"P" + b" " * 40,
+    b"",
+    b"h",
+    b"S 0",
+    b"A -1",
+    b"R 1.",
+    b"P 4194304",
+    b"\xff 3",
+    b"H1",
+)
 _QUIET_TICKS = (1, 4, 20, 60, 200, 600, 2500)
 _LOADS_NM = (0.0, 0.0, 0.2, -0.2, 3.0)
 _REPLY_TICKS = 80
@@ -146,7 +159,9 @@ def run_lockstep(config: TableConfig, ticks: int, seed: int, firmware: Path | No
     pair, done = Pair(config, seed, firmware), Lockstep()
     while done.ticks < ticks:
         _disturb(pair, chance)
-        for _ in range(chance.choice((1, 1, 1, 2))):  # more replies would wait for each other, on both lines differently
+        for _ in range(
+            chance.choice((1, 1, 1, 2))
+        ):  # more replies would wait for each other, on both lines differently
             line = random_line(chance, config)
             pair.send(line)
             done.lines += 1
