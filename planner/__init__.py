@@ -21,26 +21,26 @@ if TYPE_CHECKING:
     from planner.kinematics.configuration import Configuration
     from planner.kinematics.value import RatedPoses, UserFactor
     from planner.map.config_map import ConfigurationMap
-    from planner.planning.plan import Infeasibility, NoPlan, Plan, make_plan
-    from planner.planning.problem import Problem
     from planner.planning.scan_planning import PlannedScan
+    from planner.plans.plan import Infeasibility, NoPlan, Plan, make_plan
+    from planner.plans.problem import Problem
 
 _HOME = {
     "Configuration": "planner.kinematics.configuration",
     "ConfigurationMap": "planner.map.config_map",
-    "Infeasibility": "planner.planning.plan",
-    "NoPlan": "planner.planning.plan",
-    "Plan": "planner.planning.plan",
+    "Infeasibility": "planner.plans.plan",
+    "NoPlan": "planner.plans.plan",
+    "Plan": "planner.plans.plan",
     "PlannedScan": "planner.planning.scan_planning",
     "PlannerError": "planner.errors",
-    "Problem": "planner.planning.problem",
+    "Problem": "planner.plans.problem",
     "RatedPoses": "planner.kinematics.value",
     "RunOptions": "planner.execution.run",
     "Scan": "planner.cell.scan",
     "UserFactor": "planner.kinematics.value",
     "build_maps": "planner.api",
     "load_scan": "planner.cell.scan",
-    "make_plan": "planner.planning.plan",
+    "make_plan": "planner.plans.plan",
     "plan": "planner.api",
     "run": "planner.api",
     "with_factors": "planner.api",

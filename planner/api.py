@@ -14,9 +14,9 @@ from planner.map.config_map import ConfigurationMap
 from planner.map.map_builder import build_maps as maps_of
 from planner.map.map_problem import map_problem
 from planner.planning.own_planners import checked, planner_named
-from planner.planning.plan import NoPlan, Outcome, Planner
-from planner.planning.problem import Problem
 from planner.planning.scan_planning import PlannedScan, plan_scan
+from planner.plans.plan import NoPlan, Outcome, Planner
+from planner.plans.problem import Problem
 
 
 def with_factors(scan: Scan, *factors: UserFactor) -> Scan:

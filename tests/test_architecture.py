@@ -26,6 +26,8 @@ ROOMS = {
         "table",
         "cell",
         "map",
+        "plans",
+        "search",
         "planning",
         "execution",
         "tracking",

@@ -23,16 +23,16 @@ from planner.arrays import FloatArray
 from planner.kinematics.value import joint_factor
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, blocks_map, synthetic_map
-from planner.planning.crossing import step_is_allowed
 from planner.planning.dijkstra import dijkstra
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.lattice_choice import turn_lattice
 from planner.planning.local_maxima import local_maxima
-from planner.planning.plan import Outcome, Plan
-from planner.planning.plan_plots import PATH, draw_motion, draw_path
-from planner.planning.problem import Problem
 from planner.planning.ray_shooting import Rays, cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
+from planner.plans.crossing import step_is_allowed
+from planner.plans.plan import Outcome, Plan
+from planner.plans.plan_plots import PATH, draw_motion, draw_path
+from planner.plans.problem import Problem
 from planner.plot_style import AMBER, BLUE, SKY, VERMILION, new_figure, save_picture, styled
+from planner.search.lattice_choice import turn_lattice
 from planner.table.cost import Weights
 from planner.table.motion import Limits, limited_acceleration, next_angle, next_speed
 from protocol.command_line import Parser, program_name

@@ -37,6 +37,8 @@ FOLDERS: Final = (
     "emulator/line",
     "planner/kinematics",
     "planner/table",
+    "planner/plans",
+    "planner/search",
     "planner/planning",
     "planner/execution",
 )

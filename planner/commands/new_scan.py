@@ -16,12 +16,12 @@ from planner.commands import options
 from planner.defaults import DEFAULT_ANGLES, DEFAULT_PLANNER, TOLERANCE_DEG
 from planner.errors import PlannerError, WorkpieceError
 from planner.geometry.mesh import load_mesh
-from planner.planning.arm_motion import ArmMotion
-from planner.planning.plan import Plan
 from planner.planning.planners import PLANNERS
-from planner.planning.problem import Problem
 from planner.planning.scan_planning import ScanPlans, plan_scan
-from planner.planning.verification import verify
+from planner.plans.arm_motion import ArmMotion
+from planner.plans.plan import Plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
 from protocol.progress import progress_line
 from protocol.whole_file import write_whole
 

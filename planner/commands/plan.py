@@ -14,16 +14,16 @@ from planner.commands import options
 from planner.errors import PlannerError
 from planner.execution.run_file import RUN_RESULTS
 from planner.map.map_file import MAP_FILE
-from planner.planning.arm_motion import ArmMotion, arm_follows
-from planner.planning.arm_plots import plot_arm
 from planner.planning.own_planners import planner_named, planner_names
-from planner.planning.plan import NoPlan, Outcome, Plan, Planner
-from planner.planning.plan_file import PLAN_FILE
-from planner.planning.plan_plots import plot_plan
-from planner.planning.problem import Problem
 from planner.planning.scan_planning import PlannedScan, plan_scan
 from planner.planning.smoothing import smooth
-from planner.planning.verification import verify
+from planner.plans.arm_motion import ArmMotion, arm_follows
+from planner.plans.arm_plots import plot_arm
+from planner.plans.plan import NoPlan, Outcome, Plan, Planner
+from planner.plans.plan_file import PLAN_FILE
+from planner.plans.plan_plots import plot_plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
 from planner.plug_ins import PlugInError
 from planner.set_aside import set_aside
 from protocol.progress import progress_line

@@ -6,7 +6,7 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.execution.table_motion import Phase, TableMotion
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 
 
 class RobotMotion(NamedTuple):

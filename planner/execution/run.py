@@ -25,7 +25,7 @@ from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_motion import PauseTimes, TableMotion
 from planner.execution.table_port import CONTROL_TIMEOUT_S, open_port
 from planner.map.map_file import MAP_FILE
-from planner.planning.plan_file import PLAN_FILE
+from planner.plans.plan_file import PLAN_FILE
 from planner.set_aside import set_aside
 from planner.table.wire import Wire
 from protocol import TableClient

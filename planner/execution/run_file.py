@@ -21,7 +21,7 @@ from planner.execution.run_record import Correction, Observation, Record, Sent
 from planner.execution.run_verification import RunVerification
 from planner.execution.table_motion import PauseTimes, Phase, TableMotion
 from planner.map.map_file import MAP_FILE
-from planner.planning.plan_file import PLAN_FILE
+from planner.plans.plan_file import PLAN_FILE
 from planner.table.wire import Wire
 from protocol.data_file import DataFileError, read_json
 from protocol.trapezoid import MotionCommand

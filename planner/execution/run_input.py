@@ -12,12 +12,12 @@ from planner.execution.table_motion import PauseTimes, TableMotion
 from planner.kinematics.arm import Arm
 from planner.kinematics.configuration import Configuration
 from planner.map.map_file import MAP_FILE, load_maps
-from planner.planning.arm_check import arm_fault
-from planner.planning.plan import Plan, path_cost
-from planner.planning.plan_check import contradiction
-from planner.planning.plan_file import StoredPlan, load_plan
-from planner.planning.problem import Problem
-from planner.planning.verification import verify
+from planner.plans.arm_check import arm_fault
+from planner.plans.plan import Plan, path_cost
+from planner.plans.plan_check import contradiction
+from planner.plans.plan_file import StoredPlan, load_plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
 
 
 class RunInputError(PlannerError):

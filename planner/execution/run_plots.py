@@ -12,7 +12,7 @@ from planner.execution.run_verification import RunVerification
 from planner.execution.table_motion import Phase
 from planner.map.map_colors import colored
 from planner.map.map_plots import draw_map
-from planner.planning.plan_plots import draw_path, mark_pauses
+from planner.plans.plan_plots import draw_path, mark_pauses
 from planner.plot_style import (
     BLUE,
     EXECUTED,

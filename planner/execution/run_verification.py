@@ -12,8 +12,8 @@ from planner.execution.run_input import RunInput
 from planner.execution.run_record import Observation, Record
 from planner.execution.table_motion import Phase, TableMotion
 from planner.map.config_map import ConfigurationMap
-from planner.planning.crossing import crossing_is_allowed
-from planner.planning.plan import path_cost
+from planner.plans.crossing import crossing_is_allowed
+from planner.plans.plan import path_cost
 from planner.table.cost import PathCost
 
 # A latch with a larger deviation from the plan belongs to an earlier trigger.

@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from planner.arrays import FloatArray
-from planner.planning.plan import Pause, Plan
+from planner.plans.plan import Pause, Plan
 from planner.table.motion import Limits
 from protocol.trapezoid import MotionCommand, ReferenceState, advance, move, time_to_rest_s
 

@@ -9,14 +9,14 @@ from functools import wraps
 import numpy as np
 
 from planner.arrays import BoolArray
-from planner.planning.arm_motion import arm_motion
-from planner.planning.arm_on_path import ArmOnPath
-from planner.planning.joint_turns import Margin, lay_out_turns
-from planner.planning.lattice import Lattice, speed_unit
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.plan import Infeasibility, NoPlan, Outcome, Plan, Planner, make_plan, motion_of
-from planner.planning.problem import Problem
-from planner.planning.turn_search import MOST_SPEEDS, NotFound, find_path, node_joints
+from planner.plans.arm_motion import arm_motion
+from planner.plans.arm_on_path import ArmOnPath
+from planner.plans.plan import Infeasibility, NoPlan, Outcome, Plan, Planner, make_plan, motion_of
+from planner.plans.problem import Problem
+from planner.search.joint_turns import Margin, lay_out_turns
+from planner.search.lattice import Lattice, speed_unit
+from planner.search.lattice_choice import turn_lattice
+from planner.search.turn_search import MOST_SPEEDS, NotFound, find_path, node_joints
 from planner.table.motion import Motion
 
 # A motion of minimum cost runs along a limit, so the first search keeps a distance from the limits. If it finds

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 from planner.cell.scan import Scan
 from planner.cell.unit_hints import unit_hint
-from planner.planning.arm_motion import arm_follows
-from planner.planning.plan import Infeasibility, NoPlan, Outcome, Plan, Planner
-from planner.planning.problem import Problem
+from planner.plans.arm_motion import arm_follows
+from planner.plans.plan import Infeasibility, NoPlan, Outcome, Plan, Planner
+from planner.plans.problem import Problem
 from protocol.progress import Progress
 
 

@@ -14,12 +14,12 @@ from planner.cell.scan import load_scan
 from planner.defaults import DEFAULT_PLANNER
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
-from planner.planning.arm_motion import arm_motion
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.lattice_cost_to_go import cost_to_go
-from planner.planning.plan import Plan
 from planner.planning.scan_problem import scan_problem
-from planner.planning.verification import verify
+from planner.plans.arm_motion import arm_motion
+from planner.plans.plan import Plan
+from planner.plans.verification import verify
+from planner.search.lattice_cost_to_go import cost_to_go
 from protocol.kept_code import is_kept
 from protocol.own_program import own_environment, own_program
 from protocol.progress import ProgressOf

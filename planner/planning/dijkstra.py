@@ -16,12 +16,12 @@ from planner.arrays import FloatArray, IndexArray
 from planner.defaults import DIJKSTRA
 from planner.kernel import kernel
 from planner.map.config_map import column_value, wrapped
-from planner.planning.crossing import step_is_allowed
-from planner.planning.lattice import Lattice, motion_along, speed_unit
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.lattice_cost_to_go import steps_from
-from planner.planning.plan import Infeasibility, NoPlan, Outcome, make_plan, obvious_infeasibility
-from planner.planning.problem import Problem, Terms
+from planner.plans.crossing import step_is_allowed
+from planner.plans.plan import Infeasibility, NoPlan, Outcome, make_plan, obvious_infeasibility
+from planner.plans.problem import Problem, Terms
+from planner.search.lattice import Lattice, motion_along, speed_unit
+from planner.search.lattice_choice import turn_lattice
+from planner.search.lattice_cost_to_go import steps_from
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import Motion
 

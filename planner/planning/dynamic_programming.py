@@ -8,16 +8,16 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from planner.defaults import DYNAMIC_PROGRAMMING
-from planner.planning.crossable_intervals import crossing_motion
 from planner.planning.interpolated_planner import interpolated_plan
 from planner.planning.iterative_dynamic_programming import best_around, refine, tube
-from planner.planning.lattice import Lattice
-from planner.planning.lattice_choice import EXACTLY, NEARLY, limits_rounded_up, turn_lattice, with_limits_rounded_up
-from planner.planning.lattice_search import best_motion
-from planner.planning.plan import Infeasibility, NoPlan, Outcome, Plan, make_plan, obvious_infeasibility
-from planner.planning.problem import Problem
-from planner.planning.unreachability_proof import first_unreachable_location
-from planner.planning.verification import verify
+from planner.plans.plan import Infeasibility, NoPlan, Outcome, Plan, make_plan, obvious_infeasibility
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
+from planner.search.crossable_intervals import crossing_motion
+from planner.search.lattice import Lattice
+from planner.search.lattice_choice import EXACTLY, NEARLY, limits_rounded_up, turn_lattice, with_limits_rounded_up
+from planner.search.lattice_search import best_motion
+from planner.search.unreachability_proof import first_unreachable_location
 from planner.table.motion import Motion
 
 # The first lattice. Its minimum number of speeds in each direction. The share of the maximum speed that it must

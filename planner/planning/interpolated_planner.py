@@ -11,11 +11,11 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.kernel import kernel
 from planner.map.config_map import column_value
-from planner.planning.cost_to_go import CostToGo, cost_from, cost_to_go
-from planner.planning.crossing import step_is_allowed
-from planner.planning.plan import Plan, make_plan
-from planner.planning.problem import Problem, Terms
-from planner.planning.state_grid import Grid, default_grid
+from planner.plans.crossing import step_is_allowed
+from planner.plans.plan import Plan, make_plan
+from planner.plans.problem import Problem, Terms
+from planner.search.cost_to_go import CostToGo, cost_from, cost_to_go
+from planner.search.state_grid import Grid, default_grid
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import next_angle, next_speed, roll_out
 

@@ -6,10 +6,10 @@ the exact cost decreases. In the end, no grid limits the result, only the path t
 
 from collections.abc import Callable
 
-from planner.planning.lattice import Lattice
-from planner.planning.lattice_search import best_motion
-from planner.planning.plan import Plan, make_plan, motion_of
-from planner.planning.problem import Problem
+from planner.plans.plan import Plan, make_plan, motion_of
+from planner.plans.problem import Problem
+from planner.search.lattice import Lattice
+from planner.search.lattice_search import best_motion
 
 # The tube: speeds in each direction, and q from -Q_COUNT / 2 up. Eight single-precision numbers are one vector.
 SPEEDS_EACH_WAY = 4

@@ -3,8 +3,8 @@
 import numpy as np
 
 from planner.defaults import LOCAL_MAXIMA
-from planner.planning.plan import Outcome, greedy_start, make_plan, obvious_infeasibility
-from planner.planning.problem import Problem
+from planner.plans.plan import Outcome, greedy_start, make_plan, obvious_infeasibility
+from planner.plans.problem import Problem
 from planner.table.motion import motion_through_angles
 
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.defaults import PLANNER_NAMES
-from planner.planning.plan import Infeasibility, NoPlan, Outcome, Pause, Plan, Planner, path_cost
-from planner.planning.plan_check import plan_fault
 from planner.planning.planners import PLANNERS
-from planner.planning.problem import Problem
+from planner.plans.plan import Infeasibility, NoPlan, Outcome, Pause, Plan, Planner, path_cost
+from planner.plans.plan_check import plan_fault
+from planner.plans.problem import Problem
 from planner.plug_ins import PLANNER_GROUP, PlugInError, failure, load_plug_in, plug_in_names
 from planner.reasons import Reason
 

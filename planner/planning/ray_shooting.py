@@ -10,12 +10,12 @@ from planner.defaults import GUIDED_RAY_SHOOTING, RAY_SHOOTING
 from planner.errors import PlannerError
 from planner.kernel import kernel
 from planner.map.config_map import column_value
-from planner.planning.cost_to_go import CostToGo, cost_from_any_speed, cost_to_go
-from planner.planning.crossing import step_is_allowed
-from planner.planning.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
-from planner.planning.problem import Problem, Terms
 from planner.planning.rotate_when_blocked import nearest_allowed_angle
-from planner.planning.state_grid import Grid, default_grid
+from planner.plans.crossing import step_is_allowed
+from planner.plans.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
+from planner.plans.problem import Problem, Terms
+from planner.search.cost_to_go import CostToGo, cost_from_any_speed, cost_to_go
+from planner.search.state_grid import Grid, default_grid
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import limited_acceleration, next_angle, next_speed
 

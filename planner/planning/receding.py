@@ -16,12 +16,12 @@ from planner.defaults import RECEDING
 from planner.errors import PlannerError
 from planner.kernel import kernel
 from planner.map.config_map import column_value
-from planner.planning.backward_step import BackwardStep, prepare_backward_step, step_back
-from planner.planning.cost_to_go import cost_from_any_speed, lay_out_columns
-from planner.planning.crossing import RunArray, step_is_allowed
-from planner.planning.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
-from planner.planning.problem import Problem, Terms
-from planner.planning.state_grid import Grid, default_grid
+from planner.plans.crossing import RunArray, step_is_allowed
+from planner.plans.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
+from planner.plans.problem import Problem, Terms
+from planner.search.backward_step import BackwardStep, prepare_backward_step, step_back
+from planner.search.cost_to_go import cost_from_any_speed, lay_out_columns
+from planner.search.state_grid import Grid, default_grid
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import next_angle, next_speed
 

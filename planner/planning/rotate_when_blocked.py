@@ -5,8 +5,8 @@ import numpy as np
 from planner.defaults import ROTATE_WHEN_BLOCKED
 from planner.kernel import kernel
 from planner.map.config_map import column_value, sample_at_or_above, sample_at_or_below
-from planner.planning.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
-from planner.planning.problem import Problem, Terms
+from planner.plans.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
+from planner.plans.problem import Problem, Terms
 
 
 def rotate_when_blocked(problem: Problem) -> Outcome:

@@ -10,14 +10,14 @@ from planner.kinematics.configuration import Configuration
 from planner.map.map_builder import build_maps, is_compiled
 from planner.map.map_file import MAP_FILE, save_maps
 from planner.map.map_problem import map_problem
-from planner.planning.arm_motion import ArmMotion, arm_motion
 from planner.planning.best_configuration import Comparison, best_configuration
 from planner.planning.compiling import compiling_beside
-from planner.planning.plan import Outcome, Plan, Planner
-from planner.planning.plan_file import PLAN_FILE, plan_document, save_plan
-from planner.planning.problem import Problem
 from planner.planning.scan_problem import scan_problem
-from planner.planning.verification import Verification, verify
+from planner.plans.arm_motion import ArmMotion, arm_motion
+from planner.plans.plan import Outcome, Plan, Planner
+from planner.plans.plan_file import PLAN_FILE, plan_document, save_plan
+from planner.plans.problem import Problem
+from planner.plans.verification import Verification, verify
 from protocol.progress import ProgressOf
 
 

@@ -17,7 +17,7 @@ from planner.execution.execute import Settings, bring_to, execute
 from planner.execution.robot_motion import RobotMotion, robot_motion
 from planner.execution.run_record import Record
 from planner.execution.table_motion import Phase, TableMotion
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.scanning.latching import Drop, Pairing, RobotLatch, TableReading, Tolerances, Trigger, pair
 from planner.scanning.trigger_line import TableTruth, TriggerFaults, TriggerLine, robot_latch_times_s
 from planner.table.motion import Limits

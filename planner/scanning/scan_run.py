@@ -24,9 +24,9 @@ from planner.execution.run_input import RunInput
 from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_port import CONTROL_TIMEOUT_S, open_port
 from planner.geometry.ray_casting import RayCaster
-from planner.planning.arm_check import PlannedArm, arm_fault
 from planner.planning.planners import PLANNERS
 from planner.planning.scan_planning import plan_scan
+from planner.plans.arm_check import PlannedArm, arm_fault
 from planner.scanning.alignment import Calibration, aligned, probe_poses
 from planner.scanning.calibration import AxisCalibration, PartSize
 from planner.scanning.coverage import Coverage

@@ -8,11 +8,11 @@ import numpy as np
 from planner.arrays import CostArray, FloatArray, IndexArray
 from planner.defaults import RAY_SHOOTING, RECEDING
 from planner.kernel import kernel
-from planner.planning.cost_to_go import CostToGo
-from planner.planning.crossing import RunArray
-from planner.planning.problem import Terms
 from planner.planning.ray_shooting import Rays, ray_accelerations, ray_cost
 from planner.planning.receding import TRIALS, OnlineStep, costs_at_rest, look_ahead, trial_cost
+from planner.plans.crossing import RunArray
+from planner.plans.problem import Terms
+from planner.search.cost_to_go import CostToGo
 from planner.table.motion import limited_acceleration
 from planner.tracking.rest_motion import NO_REST, rests_after
 from planner.tracking.revealed_map import Window

@@ -18,7 +18,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.kernel import kernel
 from planner.map.config_map import column_value
-from planner.planning.problem import Terms
+from planner.plans.problem import Terms
 from planner.table.motion import next_angle, next_speed
 from planner.tracking.decision import Candidate, Method, safe_candidates
 from planner.tracking.followed_arm import FollowedArm

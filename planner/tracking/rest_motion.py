@@ -9,8 +9,8 @@ import numpy as np
 
 from planner.arrays import FloatArray, IndexArray
 from planner.kernel import kernel
-from planner.planning.crossing import crossing_is_allowed
-from planner.planning.problem import Terms
+from planner.plans.crossing import crossing_is_allowed
+from planner.plans.problem import Terms
 from planner.table.motion import next_angle, next_speed, swept_angles
 
 NO_REST = -1

@@ -11,10 +11,10 @@ import numpy as np
 from planner.arrays import CostArray, FloatArray
 from planner.errors import PlannerError
 from planner.map.config_map import DEFAULT_EPSILON, ConfigurationMap
-from planner.planning.cost_to_go import lay_out_columns
-from planner.planning.crossing import RunArray, free_runs, free_runs_down
-from planner.planning.problem import Problem, Terms
 from planner.planning.receding import SPEED_COUNT, OnlineStep, prepare_online_step
+from planner.plans.crossing import RunArray, free_runs, free_runs_down
+from planner.plans.problem import Problem, Terms
+from planner.search.cost_to_go import lay_out_columns
 from planner.table.cost import Weights
 from planner.table.motion import Limits
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from planner.map.config_map import ConfigurationMap
-from planner.planning.plan import Plan
-from planner.planning.problem import Problem
+from planner.plans.plan import Plan
+from planner.plans.problem import Problem
 
 SUB_STEPS = 64
 

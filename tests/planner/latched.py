@@ -5,7 +5,7 @@ import numpy as np
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.arrays import FloatArray
 from planner.execution.table_port import open_port
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.scanning.latched_run import LatchedRun, TriggerConditions, run_latched
 from planner.scanning.trigger_line import ProbeOnPort
 from planner.table.cost import PathCost

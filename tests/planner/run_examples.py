@@ -16,8 +16,8 @@ from planner.map.config_map import ConfigurationMap
 from planner.map.map_file import save_maps
 from planner.map.synthetic_maps import blocks_map
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import Pause, Plan, make_plan
-from planner.planning.problem import Problem
+from planner.plans.plan import Pause, Plan, make_plan
+from planner.plans.problem import Problem
 from planner.table.motion import roll_out
 
 CONFIGURATION = Configuration.parse("LEFTY-ABOVE-NOFLIP")

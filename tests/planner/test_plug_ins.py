@@ -15,7 +15,7 @@ QUICK = ["--angles", "60", "--configuration", "LEFTY-ABOVE-NOFLIP"]
 MODULE = """
 import dataclasses
 import numpy as np
-from planner.planning.plan import NoPlan
+from planner.plans.plan import NoPlan
 from planner.planning.rotate_when_blocked import rotate_when_blocked
 
 def good(problem):

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from planner.arrays import CodeArray, FloatArray, IndexArray
 from planner.kinematics.arm import Arm
-from planner.planning.arm_on_path import ArmOnPath
-from planner.planning.joint_turns import Margin
-from planner.planning.problem import Problem
+from planner.plans.arm_on_path import ArmOnPath
+from planner.plans.problem import Problem
+from planner.search.joint_turns import Margin
 from tests.planner.exhaustive_search import cost_of, motion
 
 VIPER = Arm.load()

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from planner.planning.dijkstra import dijkstra
-from planner.planning.lattice import speed_unit
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.plan import Plan
 from planner.planning.ray_shooting import cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
-from planner.planning.verification import verify
+from planner.plans.plan import Plan
+from planner.plans.verification import verify
+from planner.search.lattice import speed_unit
+from planner.search.lattice_choice import turn_lattice
 from tools.figures import (
     FIGURES,
     MOMENTS,

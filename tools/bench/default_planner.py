@@ -12,12 +12,12 @@ import numpy as np
 
 from planner.planning.dynamic_programming import dynamic_programming
 from planner.planning.interpolated_planner import interpolated_plan
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.lattice_search import best_motion
-from planner.planning.plan import Infeasibility, NoPlan, Plan, make_plan
-from planner.planning.problem import Problem
-from planner.planning.unreachability_proof import first_unreachable_location
-from planner.planning.verification import verify
+from planner.plans.plan import Infeasibility, NoPlan, Plan, make_plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
+from planner.search.lattice_choice import turn_lattice
+from planner.search.lattice_search import best_motion
+from planner.search.unreachability_proof import first_unreachable_location
 from tools.bench.planner_families import FAMILIES, Family, around_a_motion
 
 # The reference lattice: speeds in each direction, and any number of steps per column.

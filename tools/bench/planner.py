@@ -17,20 +17,20 @@ from planner.kinematics.configuration import Configuration
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
 from planner.map.synthetic_maps import MapFamily, synthetic_map
-from planner.planning.cost_to_go import cost_to_go, lay_out_columns
 from planner.planning.dijkstra import shortest_path
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.lattice_cost_to_go import cost_to_go as lattice_cost_to_go
-from planner.planning.plan import Outcome, Plan, Planner
 from planner.planning.planners import PLANNERS
-from planner.planning.problem import Problem
 from planner.planning.ray_shooting import Rays, ray_shooting
 from planner.planning.receding import FAST_SPEED_COUNT, SPEED_COUNT, online_step, prepare_online_step, receding
 from planner.planning.scan_problem import scan_problem
 from planner.planning.smoothing import smooth
-from planner.planning.state_grid import Grid
-from planner.planning.verification import verify
+from planner.plans.plan import Outcome, Plan, Planner
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
+from planner.search.cost_to_go import cost_to_go, lay_out_columns
+from planner.search.lattice_choice import turn_lattice
+from planner.search.lattice_cost_to_go import cost_to_go as lattice_cost_to_go
+from planner.search.state_grid import Grid
 from planner.table.motion import Limits
 from tools.bench.default_planner import bench_default_planner, lattice_optimum
 from tools.bench.planner_families import FAMILIES

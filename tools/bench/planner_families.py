@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.map.config_map import ConfigurationMap, sample_at_or_above, sample_at_or_below
 from planner.map.synthetic_maps import MapFamily, smooth_noise, synthetic_map
-from planner.planning.problem import Problem
+from planner.plans.problem import Problem
 from planner.table.cost import Weights, default_weights
 from planner.table.motion import Limits, Motion, roll_out, swept_angles
 

@@ -13,7 +13,7 @@ from planner.defaults import shipped_scans
 from planner.execution.execute import Settings
 from planner.execution.stream import TimedCommand, reference_states, rounded_stream, stream
 from planner.execution.table_motion import TableMotion
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
 from planner.table.wire import Wire

@@ -21,8 +21,8 @@ from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import Plan
-from planner.planning.problem import Problem
+from planner.plans.plan import Plan
+from planner.plans.problem import Problem
 from planner.table.motion import Limits
 from planner.table.wire import Wire
 from protocol import TableClient

@@ -16,7 +16,7 @@ from planner.defaults import AXES, PATTERN_NAMES
 from planner.geometry.mesh import load_mesh
 from planner.kinematics.arm import Arm
 from planner.map.config_map import ConfigurationMap
-from planner.planning.arm_motion import ArmMotion
+from planner.plans.arm_motion import ArmMotion
 from tests.planner.own_parts import OWN_PARTS
 
 MESHES = Path(__file__).parents[1] / "meshes"

@@ -18,9 +18,9 @@ from planner.execution.run_input import RunInput
 from planner.kinematics.arm import Arm
 from planner.map.synthetic_maps import blocks_map
 from planner.planning import scan_planning
-from planner.planning.arm_motion import ArmMotion, arm_motion
-from planner.planning.plan import Plan
-from planner.planning.problem import Problem
+from planner.plans.arm_motion import ArmMotion, arm_motion
+from planner.plans.plan import Plan
+from planner.plans.problem import Problem
 from planner.scanning import scan_run
 from planner.scanning.scan_file import scan_document
 from planner.scanning.scan_report import scan_report

@@ -5,8 +5,8 @@ from planner.execution.clear_path import BlockedPathError, check_ends, is_clear,
 from planner.execution.table_motion import TableMotion
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import blocks_map
-from planner.planning.plan import Plan, make_plan
-from planner.planning.problem import Problem
+from planner.plans.plan import Plan, make_plan
+from planner.plans.problem import Problem
 from planner.table.motion import Limits, roll_out
 
 

@@ -14,7 +14,7 @@ from planner.execution.run_record import Record
 from planner.execution.table_motion import Phase, TableMotion
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import blocks_map
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
 from planner.table.wire import Wire

@@ -11,7 +11,7 @@ from planner.execution.execute import ExecutionError, Settings, bring_to, execut
 from planner.execution.run_record import Record
 from planner.execution.table_motion import Phase, TableMotion
 from planner.execution.table_port import ScaledClock
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
 from planner.table.wire import Wire

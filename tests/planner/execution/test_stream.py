@@ -11,7 +11,7 @@ from planner.arrays import FloatArray
 from planner.execution.run_on import latest_s
 from planner.execution.stream import TimedCommand, check_it_fits, reference_states, rounded_stream, stream
 from planner.execution.table_motion import TableMotion
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
 from planner.table.wire import StreamError, Wire

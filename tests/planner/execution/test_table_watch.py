@@ -6,7 +6,7 @@ import pytest
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.execution.run_record import Record
 from planner.execution.table_watch import StrayedError, TableWatch
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.scanning.latched_run import ReadingMotion
 from planner.table.cost import PathCost
 from planner.table.motion import Limits

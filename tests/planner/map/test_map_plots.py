@@ -11,9 +11,9 @@ from planner.map.config_map import ConfigurationMap
 from planner.map.map_colors import DARKEST_GRAY, colored
 from planner.map.map_plots import map_figure, plot_map, plot_map_cylinder
 from planner.map.map_reasons import FIRST_PAIR, reason_texts
-from planner.planning.plan import make_plan
-from planner.planning.plan_plots import plan_figure
-from planner.planning.problem import Problem
+from planner.plans.plan import make_plan
+from planner.plans.plan_plots import plan_figure
+from planner.plans.problem import Problem
 from planner.plot_style import DPI, WIDTH_IN
 from planner.reasons import Reason
 from tests.planner.drawn import Drawn

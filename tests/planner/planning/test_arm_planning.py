@@ -18,17 +18,17 @@ from planner.map.config_map import ConfigurationMap
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
 from planner.map.synthetic_maps import MapFamily, synthetic_map
-from planner.planning.arm_check import PlannedArm, arm_fault
-from planner.planning.arm_motion import arm_follows, arm_motion
-from planner.planning.arm_on_path import ArmOnPath
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.joint_turns import Margin
-from planner.planning.plan import Infeasibility, NoPlan, Plan
 from planner.planning.planners import PLANNERS
-from planner.planning.problem import Problem
 from planner.planning.scan_problem import scan_problem
 from planner.planning.smoothing import smooth
-from planner.planning.verification import verify
+from planner.plans.arm_check import PlannedArm, arm_fault
+from planner.plans.arm_motion import arm_follows, arm_motion
+from planner.plans.arm_on_path import ArmOnPath
+from planner.plans.plan import Infeasibility, NoPlan, Plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
+from planner.search.joint_turns import Margin
 from planner.table.motion import Limits, roll_out
 from tests.planner.exhaustive_search import is_forbidden_on_the_way
 from tests.planner.winding_arm import turns_after, winding_arm

@@ -12,10 +12,10 @@ from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
 from planner.planning.compiling import compile_default_planner, compiling_beside
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.planning.scan_problem import scan_problem
-from planner.planning.arm_motion import arm_motion
-from planner.planning.verification import verify
+from planner.plans.arm_motion import arm_motion
+from planner.plans.verification import verify
 
 class Names(event.Listener):
     def on_start(self, compiling):

@@ -15,11 +15,11 @@ from planner.map.map_problem import map_problem
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.dynamic_programming import dynamic_programming
 from planner.planning.interpolated_planner import interpolated_plan
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.lattice_search import best_motion
-from planner.planning.plan import Infeasibility, NoPlan, Plan, make_plan, path_cost
-from planner.planning.problem import Problem
 from planner.planning.scan_problem import scan_problem
+from planner.plans.plan import Infeasibility, NoPlan, Plan, make_plan, path_cost
+from planner.plans.problem import Problem
+from planner.search.lattice_choice import turn_lattice
+from planner.search.lattice_search import best_motion
 from planner.table.cost import Weights, default_weights
 from planner.table.motion import Limits, motion_through_angles
 from tests.planner.exhaustive_search import is_forbidden_on_the_way, least_cost, motion

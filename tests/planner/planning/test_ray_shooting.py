@@ -8,8 +8,6 @@ import pytest
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import NoPlan, Plan
-from planner.planning.problem import Problem
 from planner.planning.ray_shooting import (
     RayError,
     Rays,
@@ -20,6 +18,8 @@ from planner.planning.ray_shooting import (
     ray_cost,
     ray_shooting,
 )
+from planner.plans.plan import NoPlan, Plan
+from planner.plans.problem import Problem
 from planner.table.motion import Limits
 from tests.planner.exhaustive_search import is_forbidden_on_the_way, motion
 

@@ -9,7 +9,7 @@ from planner.arrays import FloatArray
 from planner.execution.execute import Settings
 from planner.execution.stream import TimedCommand, reference_states, rounded_stream, stream
 from planner.execution.table_motion import TableMotion
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.table.motion import Limits
 from planner.table.wire import Wire
 from tools.bench.stream import LEAD_S, random_plan
