@@ -4,8 +4,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import Plan
-from planner.planning.problem import Problem
+from planner.plans.plan import Plan
+from planner.plans.problem import Problem
 
 
 class Price(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 
 from planner.arrays import CodeArray, FloatArray
 from planner.execution.table_motion import Phase
-from planner.planning.plan import Pause, Wait
+from planner.plans.plan import Pause, Wait
 from planner.tracking.online_planner import Kind, State, Step, Why
 from planner.tracking.tracker import Column, Tracked
 

@@ -32,7 +32,7 @@ from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
 from planner.map.map_file import MAP_FILE, save_maps
 from planner.map.map_problem import map_problem
-from planner.planning.plan_file import PLAN_FILE, plan_document, save_plan
+from planner.plans.plan_file import PLAN_FILE, plan_document, save_plan
 from planner.table.wire import Wire
 from planner.tracking.live_commands import LiveCommands, reveal_first_view
 from planner.tracking.pose_source import PathSource, PoseSource, program_source

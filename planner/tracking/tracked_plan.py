@@ -8,10 +8,10 @@ from planner.cell.scan import Scan
 from planner.cell.scan_path import ScanPath
 from planner.kinematics.joint_path import joint_speeds_deg_s
 from planner.map.config_map import ConfigurationMap
-from planner.planning.arm_motion import ArmMotion
-from planner.planning.arm_on_path import arm_on_path
-from planner.planning.plan import Plan, make_plan
-from planner.planning.problem import Problem
+from planner.plans.arm_motion import ArmMotion
+from planner.plans.arm_on_path import arm_on_path
+from planner.plans.plan import Plan, make_plan
+from planner.plans.problem import Problem
 from planner.tracking.track_record import TrackRecord
 from planner.tracking.tracker import Tracker
 
