@@ -248,7 +248,7 @@ def test_the_emulator_touches_clock_ports_and_files_at_its_edge_only() -> None:
     )  # they only teach pyserial a port
 
 
-TABLE_NAMES = ("table", "bench", "stand", "view", "simulated", "status", "snapshot", "stand_in")
+TABLE_NAMES = ("table", "bench", "stand", "view", "simulated", "status", "snapshot", "start_emulator")
 """What a table, its bench, or a look at it is called, alone or as the end of a name."""
 
 
@@ -299,7 +299,7 @@ def test_an_untyped_table_is_seen(source: str) -> None:
     assert len(list(untyped_tables(ast.parse(source)))) == 1
 
 
-def test_the_stand_in_starts_with_neither_numpy_nor_numba() -> None:
+def test_the_emulator_starts_with_neither_numpy_nor_numba() -> None:
     program = "import sys, emulator.__main__; print(*({'numpy', 'numba', 'scipy'} & sys.modules.keys()))"
     result = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
     assert result.stdout.strip() == ""

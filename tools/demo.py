@@ -18,7 +18,7 @@ from planner.__main__ import main as planner
 from protocol import TableError
 from protocol.command_line import Parser, program_name
 from protocol.ending import ended
-from tools.preemption import draw_preemption, stand_in
+from tools.preemption import draw_preemption, start_emulator
 
 SCAN = "cylinder"
 TIME_SCALE = 1.5
@@ -57,7 +57,7 @@ def scan_on_a_pty(out: Path) -> int:
     # The path of a socket must be short, but `out` need not be.
     with tempfile.TemporaryDirectory() as folder:
         control = str(Path(folder) / "control")
-        with stand_in("--pty", "--control", control, "--time-scale", f"{TIME_SCALE:g}") as port:
+        with start_emulator("--pty", "--control", control, "--time-scale", f"{TIME_SCALE:g}") as port:
             command = ["run", str(out / "plan.json"), "--port", port, "--control", control, "--arm-away"]
             command += ["--time-scale", f"{TIME_SCALE:g}", "--lead", f"{LEAD_S:g}", "--out", str(out / "run")]
             _say(f"python -m planner {' '.join(command)}")

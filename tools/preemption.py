@@ -32,7 +32,7 @@ def draw_preemption(out: Path) -> Path:
         OSError: the emulator cannot be started, or a file cannot be written.
         TableError: the table failed.
     """
-    with stand_in("--pty", "--trace", str(out / "trace.csv")) as port, TableClient.open(port) as table:
+    with start_emulator("--pty", "--trace", str(out / "trace.csv")) as port, TableClient.open(port) as table:
         _drive(table)
     figure = draw_trace(
         read_trace(out / "trace.csv"), "A motion pre-empted at full speed: the speed of the reference has no steps"
@@ -54,7 +54,7 @@ def _drive(table: TableClient) -> None:
 
 
 @contextmanager
-def stand_in(*arguments: str) -> Iterator[str]:
+def start_emulator(*arguments: str) -> Iterator[str]:
     """Run the emulator as a separate program and yield its port's name; its recording is complete afterwards.
 
     Ctrl-C at the terminal does not reach the emulator: it must still run when the table is stopped.

@@ -119,7 +119,7 @@ def soak_clients(count: float, seed: int) -> Soak:
     """Connect and disconnect clients on a pty, some of them within a line. Each must have its replies."""
     chance = Random(seed)  # noqa: S311 - not for security
     faults: list[str] = []
-    with tempfile.TemporaryDirectory() as folder, _stand_in(Path(folder) / "table") as (link, process):
+    with tempfile.TemporaryDirectory() as folder, _emulator(Path(folder) / "table") as (link, process):
         descriptors = _descriptors(process)
         for index in range(round(count)):
             try:
@@ -215,7 +215,7 @@ def _descriptors(process: "subprocess.Popen[str]") -> int:
 
 
 @contextmanager
-def _stand_in(link: Path) -> "Iterator[tuple[str, subprocess.Popen[str]]]":
+def _emulator(link: Path) -> "Iterator[tuple[str, subprocess.Popen[str]]]":
     """Run an emulator on a pty under a link."""
     command = own_program("emulator", "--pty", "--link", str(link), "--baud", "0")
     with subprocess.Popen(

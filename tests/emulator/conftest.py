@@ -17,7 +17,7 @@ PATIENCE_S = 20.0
 """How long to wait for what should come at once: only a failing test ever does."""
 
 
-class StandIn:
+class EmulatorProcess:
     """A running `python -m emulator`; it is ended, and must end well, when its test is over."""
 
     def __init__(self, arguments: tuple[str, ...], stderr_path: Path) -> None:
@@ -56,12 +56,12 @@ def wait_until(condition: Callable[[], bool]) -> None:
 
 
 @pytest.fixture
-def stand_in(tmp_path: Path) -> Iterator[Callable[..., StandIn]]:
+def start_emulator(tmp_path: Path) -> Iterator[Callable[..., EmulatorProcess]]:
     """Start emulators with the given arguments."""
-    started: list[StandIn] = []
+    started: list[EmulatorProcess] = []
 
-    def start(*arguments: str) -> StandIn:
-        started.append(StandIn(arguments, tmp_path / f"stderr{len(started)}"))
+    def start(*arguments: str) -> EmulatorProcess:
+        started.append(EmulatorProcess(arguments, tmp_path / f"stderr{len(started)}"))
         return started[-1]
 
     yield start

@@ -133,7 +133,7 @@ def test_an_answer_of_something_else_is_never_taken_for_a_look_at_a_table(reply:
         ControlChannel(folder / "control")
 
 
-def test_a_stand_in_that_takes_nobody_in_is_not_waited_for(folder: Path) -> None:
+def test_an_emulator_that_takes_nobody_in_is_not_waited_for(folder: Path) -> None:
     with socket.socket(socket.AF_UNIX) as deaf, socket.socket(socket.AF_UNIX) as waiting:
         deaf.bind(str(folder / "control"))
         deaf.listen(0)

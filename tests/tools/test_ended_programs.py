@@ -35,7 +35,7 @@ SLOWLY = 0.3
 STANDS = re.compile(r"the table was stopped and stands at (-?[0-9.]+) deg")
 
 
-class StandIn(NamedTuple):
+class EmulatorProcess(NamedTuple):
     """An emulator on a pty, and its control channel."""
 
     port: str
@@ -53,24 +53,24 @@ class StandIn(NamedTuple):
 
 
 @contextmanager
-def stand_in(folder: Path, time_scale: float = 1.0) -> Iterator[StandIn]:
+def start_emulator(folder: Path, time_scale: float = 1.0) -> Iterator[EmulatorProcess]:
     control = folder / "control"
     command = [sys.executable, "-m", "emulator", "--pty", "--control", str(control), "--time-scale", f"{time_scale}"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         assert process.stdout is not None
         try:
-            yield StandIn(process.stdout.readline().strip(), control)
+            yield EmulatorProcess(process.stdout.readline().strip(), control)
         finally:
             process.terminate()
 
 
-def run_command(table: StandIn, folder: Path) -> list[str]:
+def run_command(table: EmulatorProcess, folder: Path) -> list[str]:
     """Return `planner run` of a short plan, from a table that stands elsewhere."""
     words = ["planner", "run", str(write_short_scan(folder)), "--port", table.port, "--control", str(table.control)]
     return [*words, "--time-scale", f"{SLOWLY}", "--arm-away", "--out", str(folder / "out")]
 
 
-def scan_command(table: StandIn, folder: Path) -> list[str]:
+def scan_command(table: EmulatorProcess, folder: Path) -> list[str]:
     file = folder / "part.toml"
     file.write_text(SCAN)
     words = ["planner", "scan", str(file), "--port", table.port, "--control", str(table.control), "--rate", "5"]
@@ -78,7 +78,7 @@ def scan_command(table: StandIn, folder: Path) -> list[str]:
     return [*words, *quickly, "--time-scale", f"{SLOWLY}", "--out", str(folder / "out")]
 
 
-def record_command(table: StandIn, folder: Path) -> list[str]:
+def record_command(table: EmulatorProcess, folder: Path) -> list[str]:
     return ["tools.identify", "record", "--port", table.port, "--out", str(folder / "trace.csv")]
 
 
@@ -98,7 +98,7 @@ def test_a_signal_stops_the_table_and_a_second_one_does_not_cut_that_short(
     name: str, numbers: Sequence[signal.Signals], tmp_path: Path
 ) -> None:
     command, time_scale = COMMANDS[name]
-    with stand_in(tmp_path, time_scale) as table:
+    with start_emulator(tmp_path, time_scale) as table:
         words = [sys.executable, "-m", *command(table, tmp_path)]
         with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             table.wait_until(is_moving=True)
@@ -117,7 +117,7 @@ def test_a_signal_stops_the_table_and_a_second_one_does_not_cut_that_short(
 
 @pytest.mark.realtime
 def test_an_ignored_ctrl_c_stays_ignored(tmp_path: Path) -> None:
-    with stand_in(tmp_path, 1.0) as table:
+    with start_emulator(tmp_path, 1.0) as table:
         script = f"trap '' INT; exec {sys.executable} -m {' '.join(record_command(table, tmp_path))} --duration 10"
         with subprocess.Popen(["/bin/sh", "-c", script], stderr=subprocess.PIPE, text=True) as process:
             table.wait_until(is_moving=True)

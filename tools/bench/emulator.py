@@ -105,7 +105,7 @@ def _minute_of_motion() -> Callable[[], object]:
 def _bench_round_trip(stream: TextIO) -> None:
     with _raw_echo() as (path, _):
         echo = _round_trips(path)
-    with _stand_in("--pty", "--baud", "0") as (path, _):
+    with _emulator("--pty", "--baud", "0") as (path, _):
         ours = _round_trips(path)
     rows = [
         (name, f"{percentile(times, 0.5) * 1e3:.3f} ms", f"{percentile(times, 0.99) * 1e3:.3f} ms")
@@ -133,7 +133,7 @@ def _bench_start(stream: TextIO) -> None:
 
 
 def _bench_idle(stream: TextIO) -> None:
-    with _stand_in("--pty") as (_, process):
+    with _emulator("--pty") as (_, process):
         time.sleep(0.5)
         before, start = _cpu_s(process.pid), time.perf_counter()
         time.sleep(4.0)
@@ -229,7 +229,7 @@ def _raw_echo() -> Iterator[tuple[str, None]]:
 
 
 @contextmanager
-def _stand_in(*arguments: str) -> Iterator[tuple[str, "subprocess.Popen[str]"]]:
+def _emulator(*arguments: str) -> Iterator[tuple[str, "subprocess.Popen[str]"]]:
     command = own_program("emulator", *arguments)
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=own_environment()

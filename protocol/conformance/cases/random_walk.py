@@ -41,10 +41,10 @@ def walk(rig: Rig) -> None:
     try:
         search(rig, chance, ON_A_PORT, _FoundError)
     except _FoundError as found:
-        raise NonconformityError(f"{found}; {_on_the_stand_in(rig, chance)}") from None
+        raise NonconformityError(f"{found}; {_on_the_emulator(rig, chance)}") from None
 
 
-def _on_the_stand_in(rig: Rig, chance: int) -> str:
+def _on_the_emulator(rig: Rig, chance: int) -> str:
     """Return the result of the same walks on the emulator."""
     try:
         port = open_port(_STAND_IN_URL, rig.profile)

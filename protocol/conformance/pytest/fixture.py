@@ -100,7 +100,7 @@ class RotaryTable:
 
 
 @contextmanager
-def pty_stand_in(folder: Path) -> Iterator[tuple[str, Path]]:
+def pty_emulator(folder: Path) -> Iterator[tuple[str, Path]]:
     """Run an emulator on a pseudo-terminal, and yield its device and its control channel."""
     control = folder / "control"
     command = own_program("emulator", "--pty", "--control", str(control))

@@ -15,7 +15,7 @@ from protocol.conformance.cases.case import Case
 from protocol.conformance.cases.catalog import all_cases
 from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import ProfileError, load_profile
-from protocol.conformance.pytest.fixture import PTY, pty_stand_in
+from protocol.conformance.pytest.fixture import PTY, pty_emulator
 from protocol.conformance.session.suite import Session, session_at
 from protocol.interrupts import ended_by_signals
 
@@ -27,7 +27,7 @@ def session(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactor
     may_move = pytestconfig.getoption("--table-yes") or url == PTY
     with ExitStack() as stack:
         if url == PTY:
-            url, control = stack.enter_context(pty_stand_in(tmp_path_factory.mktemp("table")))
+            url, control = stack.enter_context(pty_emulator(tmp_path_factory.mktemp("table")))
         try:
             profile = load_profile(pytestconfig.getoption("--table-profile"))
             port = open_port(url, profile)

@@ -110,9 +110,9 @@ def test_at_a_wrong_rate_both_ends_hear_garbage(bench: Bench) -> None:
 
 
 @pytest.mark.realtime
-def test_a_pulled_port_comes_back_under_its_link(stand_in: Callable[..., Any], tmp_path: Path) -> None:
+def test_a_pulled_port_comes_back_under_its_link(start_emulator: Callable[..., Any], tmp_path: Path) -> None:
     link, control = tmp_path / "table", tmp_path / "control"
-    running = stand_in("--pty", "--link", str(link), "--control", str(control))
+    running = start_emulator("--pty", "--link", str(link), "--control", str(control))
     with TableClient.open(str(link)) as client:
         assert client.position_deg() == 0.0
         command(control, "fault-hang-up", "--for-s", "0.3")
@@ -125,10 +125,10 @@ def test_a_pulled_port_comes_back_under_its_link(stand_in: Callable[..., Any], t
 
 @pytest.mark.realtime
 def test_over_tcp_a_pulled_port_turns_clients_away(
-    stand_in: Callable[..., Any], tmp_path: Path, wait_until: Callable[[Callable[[], bool]], None]
+    start_emulator: Callable[..., Any], tmp_path: Path, wait_until: Callable[[Callable[[], bool]], None]
 ) -> None:
     control = tmp_path / "control"
-    running = stand_in("--tcp", "0", "--control", str(control))
+    running = start_emulator("--tcp", "0", "--control", str(control))
     with TableClient.open(running.port) as client:
         assert client.position_deg() == 0.0
         command(control, "fault-hang-up")

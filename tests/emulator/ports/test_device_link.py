@@ -50,7 +50,7 @@ def test_a_directory_is_never_overwritten(tmp_path: Path) -> None:
         DeviceLink(tmp_path, DEVICE)
 
 
-def test_a_link_that_another_stand_in_has_taken_over_is_left_to_it(tmp_path: Path) -> None:
+def test_a_link_that_another_emulator_has_taken_over_is_left_to_it(tmp_path: Path) -> None:
     path = tmp_path / "table"
     first = DeviceLink(path, DEVICE)
     DeviceLink(path, OTHER_DEVICE)

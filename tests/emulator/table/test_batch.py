@@ -50,7 +50,7 @@ def test_interpreted_and_compiled_agree_to_the_last_bit(seed: int) -> None:
     assert compiled_samples.tobytes() == samples.tobytes()
 
 
-def test_a_batch_is_what_the_stand_in_does() -> None:
+def test_a_batch_is_what_the_emulator_does() -> None:
     """The same motion by command and by row; samples bear what the status says."""
     table = Table(CONFIG, seed=3)
     snapshot = table.snapshot()

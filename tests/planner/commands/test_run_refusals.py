@@ -22,7 +22,7 @@ Change = Callable[[Document], object]
 
 
 @pytest.fixture(scope="module")
-def stand_in(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
+def start_emulator(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
     """Yield the port and the control channel of a running emulator."""
     control = tmp_path_factory.mktemp("emulator") / "control"
     command = [sys.executable, "-m", "emulator", "--tcp", "0", "--control", str(control)]
@@ -127,14 +127,14 @@ REFUSED: dict[str, tuple[Change, str]] = {
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_an_arm_that_cannot_follow_is_refused_in_one_line_and_nothing_moves(
-    case: str, stand_in: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    case: str, start_emulator: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     change, sentence = REFUSED[case]
     plan_file = write_short_scan(tmp_path)
     document = json.loads(plan_file.read_text(encoding="utf-8"))
     change(document)
     plan_file.write_text(json.dumps(document), encoding="utf-8")
-    port, control = stand_in
+    port, control = start_emulator
     before = state_of(control)
     arguments = ["--port", port, "--control", str(control), "--out", str(tmp_path / "run")]
     assert main(["run", str(plan_file), *arguments]) == 2
@@ -160,9 +160,9 @@ def test_the_example_that_the_refusals_change_is_a_plan_that_runs(tmp_path: Path
 
 
 def test_a_table_that_turns_already_is_not_moved(
-    stand_in: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    start_emulator: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    port, control = stand_in
+    port, control = start_emulator
     plan_file = write_short_scan(tmp_path)
     with TableClient.open(port) as table:
         table.set_speed(20.0)

@@ -16,7 +16,6 @@ from planner.map.map_problem import map_problem
 from planner.table.wire import Wire
 from planner.tracking.online_planner import Step
 from planner.tracking.tracker import Tracked, Tracker, TrackSettings
-from tests.planner.goals import to_xyz_yaw_pitch_roll
 
 LOCATIONS = 24
 CONFIGURATION = Configuration.LEFTY_ABOVE_NOFLIP

@@ -98,7 +98,7 @@ def test_the_suite_runs_under_pytest(tmp_path: Path) -> None:
 
 
 @pytest.mark.realtime
-def test_the_suite_starts_a_pty_stand_in_under_pytest(tmp_path: Path) -> None:
+def test_the_suite_starts_a_pty_emulator_under_pytest(tmp_path: Path) -> None:
     result = run_pytest(tmp_path, "--pyargs", "protocol.conformance", "--table-port", "pty", "-k", "5.3 or 6.2/2")
     assert "7 passed" in result.stdout, result.stdout + result.stderr
 

@@ -49,11 +49,11 @@ def rotary_table(
     for package in ("protocol", "emulator") if rotary_table_port.startswith(IN_PROCESS) else ("protocol",):
         if clash := hidden(package):
             pytest.fail(f"rotary_table: {clash}", pytrace=False)
-    from protocol.conformance.pytest.fixture import RotaryTable, pty_stand_in  # noqa: PLC0415 - see the module's docstring
+    from protocol.conformance.pytest.fixture import RotaryTable, pty_emulator  # noqa: PLC0415 - see the module's docstring
 
     control = pytestconfig.getoption("--table-control")
     with ExitStack() as stack:
         url = rotary_table_port
         if url == PTY:
-            url, control = stack.enter_context(pty_stand_in(tmp_path_factory.mktemp("table")))
+            url, control = stack.enter_context(pty_emulator(tmp_path_factory.mktemp("table")))
         yield stack.enter_context(RotaryTable(url, control, pytestconfig.getoption("--table-profile")))

@@ -161,8 +161,8 @@ def test_a_table_is_triggered_and_switched_by_programs_alone(tmp_path: Path) -> 
         f"[rig]\ntrigger_command = {json.dumps([*client, 'trigger'])}\n"
         f"power_cycle_command = {json.dumps([*client, 'reset'])}\n"
     )
-    stand_in = [sys.executable, "-m", "emulator", "--tcp", "0", "--control", str(control)]
-    with subprocess.Popen(stand_in, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+    start_emulator = [sys.executable, "-m", "emulator", "--tcp", "0", "--control", str(control)]
+    with subprocess.Popen(start_emulator, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         assert process.stdout is not None
         port = process.stdout.readline().strip()
         words = ["--port", port, "--profile", str(profile), "--yes", "--case", "6.1/5", "--case", "6.2/2"]

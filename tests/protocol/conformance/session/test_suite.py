@@ -35,7 +35,7 @@ def profile_with(tmp_path: Path, text: str) -> Profile:
     return load_profile(file)
 
 
-def test_the_stand_in_passes_every_case() -> None:
+def test_the_emulator_passes_every_case() -> None:
     outcomes = run("emulator://", load_profile())
     bad = [(outcome.case.id, outcome.reason) for outcome in outcomes if outcome.verdict is not Verdict.PASS]
     assert [case for case, _ in bad] == ["5.4/1", "5.4/2"], bad
@@ -243,7 +243,7 @@ def test_every_random_walk_finds_a_setting_that_is_lost_in_a_motion(wrong: str) 
             search(rig_on(port_to(MUTANTS[wrong][1]), seed), seed, SIMULATED, NonconformityError)
 
 
-def test_on_a_real_table_a_failing_walk_is_not_repeated_but_shrunk_on_the_stand_in() -> None:
+def test_on_a_real_table_a_failing_walk_is_not_repeated_but_shrunk_on_the_emulator() -> None:
     rigs = [rig_on(port_to(MUTANTS["R counts from the old target"][1]), seed) for seed in range(8)]
     for rig in rigs:
         rig.wire.port.inner = UnclockedPort(rig.wire.port.inner)
@@ -287,7 +287,7 @@ class UnclockedPort:
         self._port.close()
 
 
-def test_the_default_profile_has_the_stand_ins_limits() -> None:
+def test_the_default_profile_has_the_emulators_limits() -> None:
     profile, config = load_profile(), load_config()
     assert (profile.limits.speed_deg_s, profile.power_on.speed_deg_s) == (
         config.limits.speed_deg_s,
