@@ -36,7 +36,7 @@ from tools.tuning.gain_files import gains_header, gains_toml
 from tools.tuning.given_gains import given_gains
 from tools.tuning.tune_plots import plots
 from tools.tuning.tune_report import tune_report, verdict
-from tools.tuning.tuned_table import Tuning, TuningError, judge, tune
+from tools.tuning.tuned_table import Terms, Tuning, TuningError, judge, tune
 
 _TUNE_FOLDER, _JUDGE_FOLDER = Path("build/tune"), Path("build/judge")
 
@@ -51,11 +51,11 @@ def _tune(options: argparse.Namespace) -> int:
     if options.judge:
         return _judge(options)
     config = load_config(options.config)
-    limits = _limits(options)
+    terms = _terms(options)
     folder = options.out or _TUNE_FOLDER
     check_folder(folder)
     with share_shown("tuning") as progress:
-        tuning = tune(config, limits, options.plants, options.spread / 100.0, options.seed, progress)
+        tuning = tune(config, terms, progress)
     _write(folder, tuning, options.command_line)
     if not tuning.feasible:
         raise TuningError(_refusal(tuning, options))
@@ -65,13 +65,13 @@ def _tune(options: argparse.Namespace) -> int:
 
 def _judge(options: argparse.Namespace) -> int:
     config, gains = given_gains(options.judge, options.config)
-    limits = _limits(options)
+    terms = _terms(options)
     folder = options.out or _JUDGE_FOLDER
     if options.judge.resolve() == (folder / "gains.toml").resolve():
         raise TuningError(f"{options.judge} would be overwritten; --out must be another folder")
     check_folder(folder)
     with share_shown("judging") as progress:
-        tuning = judge(config, gains, limits, options.plants, options.spread / 100.0, options.seed, progress)
+        tuning = judge(config, gains, terms, progress)
     _write(folder, tuning, options.command_line)
     _print(tuning)
     print(verdict(tuning))
@@ -107,7 +107,7 @@ def _command_line(options: argparse.Namespace, limits: Limits) -> str:
     return shlex.join(words)
 
 
-def _limits(options: argparse.Namespace) -> Limits:
+def _terms(options: argparse.Namespace) -> Terms:
     for name in ("ms", "gain_margin", "phase_margin", "noise", "bandwidth", "overshoot", "settling"):
         value, least = getattr(options, name), 1.0 if name == "ms" else 0.0
         if not least < value < inf:
@@ -118,7 +118,7 @@ def _limits(options: argparse.Namespace) -> Limits:
         raise TuningError(f"--spread is {options.spread:g}; it must be at least 0 and less than 100 %")
     if options.seed < 0:
         raise TuningError(f"--seed is {options.seed}; it must be at least 0")
-    return Limits(
+    limits = Limits(
         options.ms,
         options.gain_margin,
         options.phase_margin,
@@ -127,6 +127,7 @@ def _limits(options: argparse.Namespace) -> Limits:
         options.overshoot / 100.0,
         options.settling / 1e3,
     )
+    return Terms(limits, options.plants, options.spread / 100.0, options.seed)
 
 
 def _write(folder: Path, tuning: Tuning, command: str) -> None:

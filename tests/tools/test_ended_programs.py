@@ -14,22 +14,10 @@ import pytest
 
 from emulator.control_client import request
 from tests.planner.run_examples import write_short_scan
+from tests.planner.small_scan import SMALL
 
 OURS = re.compile(rf"{re.escape(str(Path(__file__).parents[2]))}/(emulator|planner|protocol|tools)/")
 """A file of this project in a traceback."""
-SCAN = """
-[cell]
-workpiece_on_table = [0, 0, 80, 0, 0, 0]
-[workpiece]
-class = "cylinder"
-diameter_mm = 100
-height_mm = 100
-[path]
-pattern = "rings"
-bottom_margin_mm = 20
-scan_speed_mm_s = 25
-time_step_s = 0.5
-"""
 SLOWLY = 0.3
 """The time scale of the emulator under a scan that would soon be over."""
 STANDS = re.compile(r"the table was stopped and stands at (-?[0-9.]+) deg")
@@ -72,7 +60,7 @@ def run_command(table: EmulatorProcess, folder: Path) -> list[str]:
 
 def scan_command(table: EmulatorProcess, folder: Path) -> list[str]:
     file = folder / "part.toml"
-    file.write_text(SCAN)
+    file.write_text(SMALL)
     words = ["planner", "scan", str(file), "--port", table.port, "--control", str(table.control), "--rate", "5"]
     quickly = ["--angles", "60", "--configuration", "LEFTY-ABOVE-NOFLIP", "--exact-calibration"]
     return [*words, *quickly, "--time-scale", f"{SLOWLY}", "--out", str(folder / "out")]

@@ -72,45 +72,50 @@ class Tuning(NamedTuple):
         return not any(tuned.design.broken for tuned in self.sets.values())
 
 
-def tune(
-    config: TableConfig,
-    limits: Limits,
-    plants: int,
-    spread: float,
-    seed: int,
-    progress: Callable[[float], None] = lambda _: None,
-) -> Tuning:
-    """Return the best gain sets within the limits, or the nearest ones, and their results.
+class Terms(NamedTuple):
+    """What gain sets are judged by: bounds, and random tables about the configured one.
+
+    Attributes:
+        limits: the bounds.
+        plants: the number of random tables.
+        spread: by which share of itself each of their constants may differ.
+        seed: of tables and checks.
+    """
+
+    limits: Limits
+    plants: int
+    spread: float
+    seed: int
+
+
+def tune(config: TableConfig, terms: Terms, progress: Callable[[float], None] = lambda _: None) -> Tuning:
+    """Return the gain sets that are best within the limits, or nearest to them, and how they do.
 
     Raises:
         TuningError: no gains make both loops stable.
     """
-    size = grid_size(config, limits)
-    loops = Loops.of([config], size)
-    scanned = scan(loops)
+    limits = terms.limits
+    scanned = scan(Loops.of([config], grid_size(config, limits)))
     progress(0.1)
     designs = both_designs(scanned, limits)
     if not designs.stable:
         raise TuningError("no gains make the speed loop stable; shorten control.speed_window_ticks or the tick")
     eased = _eased(scanned, limits, designs) if designs.broken else None
     progress(0.3)
-    return examined(scanned, limits, eased, (designs.ramp, designs.hold), plants, spread, seed, progress, TUNED)
+    return examined(scanned, terms, eased, (designs.ramp, designs.hold), progress, TUNED)
 
 
 def examined(
     scanned: Scan,
-    limits: Limits,
+    terms: Terms,
     eased: Limits | None,
     designs: tuple[Design, Design],
-    plants: int,
-    spread: float,
-    seed: int,
     progress: Callable[[float], None],
     words: Words,
 ) -> Tuning:
     """Return the results of the gain sets of two designs on a table, and those of its configuration."""
     loops, (ramp, hold) = scanned.loops, designs
-    config = loops.config
+    config, (limits, plants, spread, seed) = loops.config, terms
     after = with_gains(config, gains_config(config, ramp.gains), gains_config(config, hold.gains))
     # Half as fine as for the design, which is sufficient for all loops within the bounds.
     tables = spread_tables(config, plants, spread, seed)
@@ -136,25 +141,20 @@ def examined(
 
 
 def judge(
-    config: TableConfig,
-    gains: GainSetsConfig,
-    limits: Limits,
-    plants: int,
-    spread: float,
-    seed: int,
-    progress: Callable[[float], None] = lambda _: None,
+    config: TableConfig, gains: GainSetsConfig, terms: Terms, progress: Callable[[float], None] = lambda _: None
 ) -> Tuning:
     """Return the results of given gain sets on a table, within the limits or not, and those of its configuration.
 
     Raises:
         ConfigError: the gains do not fit the firmware.
     """
+    limits = terms.limits
     loops = Loops.of([config], grid_size(config, limits))
     scanned, designs = scan(loops), []
     for given, bounds in ((gains.ramp, limits.for_ramp()), (gains.hold, limits.for_hold())):
         held = registers(config, given)
         designs.append(Design(held, settled_figures(loops, held), bounds))
-    return examined(scanned, limits, None, (designs[0], designs[1]), plants, spread, seed, progress, JUDGED)
+    return examined(scanned, terms, None, (designs[0], designs[1]), progress, JUDGED)
 
 
 def settled_figures(loops: Loops, gains: Gains) -> LoopFigures:

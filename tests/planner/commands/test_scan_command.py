@@ -26,20 +26,8 @@ from planner.scanning.scan_file import scan_document
 from planner.scanning.scan_report import scan_report
 from planner.scanning.scan_run import ScanOptions, run_on_port, scan_workpiece
 from planner.table.cost import PathCost
+from tests.planner.small_scan import SMALL
 
-SMALL = """
-[cell]
-workpiece_on_table = [0, 0, 80, 0, 0, 0]
-[workpiece]
-class = "cylinder"
-diameter_mm = 100
-height_mm = 100
-[path]
-pattern = "rings"
-bottom_margin_mm = 20
-scan_speed_mm_s = 25
-time_step_s = 0.5
-"""
 QUICK = ["--angles", "60", "--configuration", "LEFTY-ABOVE-NOFLIP"]
 EXACT = "[gears]\nbacklash_arcmin = 0.0\n"
 
