@@ -81,7 +81,7 @@ PROTOCOL_EDGE = {
     "protocol/interrupts.py": {"signal", "threading"},
     "protocol/ending.py": {"os"},
     "protocol/kept_code.py": {"pathlib"},
-    "protocol/kept_file.py": {"os", "pathlib", "time"},
+    "protocol/kept_file.py": {"fcntl", "os", "pathlib", "time"},
     "protocol/progress.py": {"os"},
     "protocol/quiet_start.py": {"os", "signal"},
     "protocol/conformance/__main__.py": {"pathlib"},

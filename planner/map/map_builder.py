@@ -89,11 +89,14 @@ def build_maps(
         progress(0, n_locations)
     for first in range(0, n_locations, block):
         last = min(first + block, n_locations)
-        window = values[:, first:last], reasons[:, first:last]
+        # Of its own, in one piece: parts of the maps would be another type, for which numba compiles once more.
+        block_shape = shape[0], last - first, n_angles
+        rated = np.empty(block_shape), np.empty(block_shape, dtype=np.uint8)
         if user_factors:
-            rate_with_user_factors(cells, problem.cell.arm, user_factors, first, *window)
+            rate_with_user_factors(cells, problem.cell.arm, user_factors, first, *rated)
         else:
-            rate_columns(*cells, first, *window, *NO_POSES)
+            rate_columns(*cells, first, *rated, *NO_POSES)
+        values[:, first:last], reasons[:, first:last] = rated
         if progress is not None:
             progress(last, n_locations)
     metadata = {

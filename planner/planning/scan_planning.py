@@ -104,9 +104,8 @@ def plan_scan(
         ConfigurationNameError: the name does not exist.
     """
     asked = list(Configuration) if configuration == "best" else [Configuration.parse(configuration)]
-    with compiling_beside(compiled, progress) as wait:
+    with compiling_beside(compiled, progress):
         problem = map_problem(scan, progress("distance field"))
         maps = build_maps(problem, asked, angle_count, progress("map" if is_compiled() else "map (compiling, once)"))
-        wait()
-    problems = {each.label: scan_problem(scan, map_, start_angle_deg) for each, map_ in maps.items()}
-    return ScanPlans(scan, problems, best_configuration(problems, planner, progress("plan")))
+        problems = {each.label: scan_problem(scan, map_, start_angle_deg) for each, map_ in maps.items()}
+        return ScanPlans(scan, problems, best_configuration(problems, planner, progress("plan")))

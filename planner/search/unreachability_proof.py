@@ -102,7 +102,9 @@ def _first_empty(terms: Terms, edges: FloatArray, start: Reachable) -> int:
     cells_in_a_step = 2.0 * terms.acceleration_limit_deg_s2 * terms.step_s / (edges[1] - edges[0]) + 3.0
     cells_in_a_step = min(cells_in_a_step, float(len(edges) - 1))
     for k in range(len(terms.values) - 1):
-        run_count = 1 + np.count_nonzero((terms.runs[k] > 0) & (np.roll(terms.runs[k], 1) == 0))
+        run_count = 1
+        for i in range(terms.runs.shape[1]):
+            run_count += terms.runs[k, i] > 0 and terms.runs[k, i - 1] == 0
         work += reachable.interval_count.sum() * cells_in_a_step * run_count
         if work > MOST_WORK:
             return -1
@@ -148,7 +150,9 @@ def _step(terms: Terms, edges: FloatArray, column: int, now: Reachable) -> Reach
         pieces = unite(piece_lows, piece_highs, pieces, turn)
         if pieces > lows.shape[1]:
             lows, highs = _with_more_room(lows, 2 * pieces), _with_more_room(highs, 2 * pieces)
-        lows[later, :pieces], highs[later, :pieces], count[later] = piece_lows[:pieces], piece_highs[:pieces], pieces
+        count[later] = pieces
+        for i in range(pieces):
+            lows[later, i], highs[later, i] = piece_lows[i], piece_highs[i]
     return Reachable(slowest, fastest, count, lows, highs)
 
 
@@ -180,7 +184,9 @@ def _least_turn(low: float, high: float, later_low: float, later_high: float) ->
 @kernel
 def _with_more_room(array: FloatArray, room: int) -> FloatArray:
     larger = np.empty((len(array), room))
-    larger[:, : array.shape[1]] = array
+    for row in range(len(array)):
+        for i in range(array.shape[1]):  # the assignment of slices brings its texts of errors into the machine code
+            larger[row, i] = array[row, i]
     return larger
 
 
