@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from emulator.avr.chip import Chip
 from emulator.avr.compiled_table import CompiledTable
-from emulator.avr.header import MOST_EDGES_S
+from emulator.avr.header import CLOCK_HZ, MOST_EDGES_S
 from emulator.config.table_config import TableConfig, load_config
 from emulator.table.table import Table
 
@@ -57,8 +57,11 @@ _NONSENSE = (
 )
 _QUIET_TICKS = (1, 4, 20, 60, 200, 600, 2500)
 _LOADS_NM = (0.0, 0.0, 0.2, -0.2, 3.0)
-_REPLY_TICKS = 80
-"""Within which the longest reply has left."""
+
+
+_BEFORE_CARRY = 253
+"""Edges after which one more changes both bytes of the counter, which begins at the phase 2 of the encoder."""
+_CYCLES_ABOUT_A_TICK = 420
 
 
 class PartingError(Exception):
@@ -114,6 +117,11 @@ class Pair:
         for table in (self.emulated, self.compiled):
             table.receive(line + b"\r")
 
+    def trigger(self) -> None:
+        """Put an edge on the trigger of both, between two ticks."""
+        self.emulated.trigger()
+        self.compiled.trigger()
+
     def step(self, ticks: int = 1) -> None:
         """Let ticks pass, one by one.
 
@@ -142,9 +150,11 @@ class Pair:
         for name, ours_value in ours_seen._asdict().items():
             if (theirs_value := getattr(theirs_seen, name)) != ours_value:
                 raise PartingError(f"{name} is {ours_value} at the emulator and {theirs_value} at the firmware")
-        if self.compiled.chip.lost_edges or self.compiled.overruns:
+        chip, overruns = self.compiled.chip, self.compiled.overruns
+        if chip.lost_edges or overruns or chip.duty_changes:
             raise PartingError(
-                f"the firmware lost {self.compiled.chip.lost_edges} edges and {self.compiled.overruns} ticks"
+                f"the firmware lost {chip.lost_edges} edges and {overruns} ticks, and changed the duty amid "
+                f"{chip.duty_changes} ticks"
             )
         self.replies = (self.replies[0] + ours, self.replies[1] + theirs)
 
@@ -181,8 +191,7 @@ def run_lockstep(config: TableConfig, ticks: int, seed: int, firmware: Path | No
 def _disturb(pair: Pair, chance: Random) -> None:
     """Now and then let something come that is not on the line."""
     if chance.random() < 0.2:
-        pair.emulated.trigger()
-        pair.compiled.trigger()
+        pair.trigger()
     if chance.random() < 0.05:
         load_Nm = chance.choice(_LOADS_NM)
         pair.emulated.set_load_torque(load_Nm)
@@ -202,6 +211,8 @@ def random_line(chance: Random, config: TableConfig) -> bytes:
     if verb in "HL":
         return verb.encode()
     scale = {"P": 300.0, "R": 40.0, "S": 1.1 * limits.speed_deg_s, "A": 1.1 * limits.acceleration_deg_s2}[verb]
+    if verb in "SA" and chance.random() < 0.4:
+        return f"{verb} {scale / 1.1:.1f}".encode()
     value = scale * chance.choice((1.0, 1.0, 0.05, 0.0005)) * chance.random()
     sign = chance.choice(("", "", "+", "-")) if verb in "PR" else ""
     return f"{verb}{' ' * chance.randint(0, 2)}{sign}{value:.{digits}f}".encode()
@@ -237,10 +248,30 @@ def run_edges(config: TableConfig, ticks: int, edges_s: int = MOST_EDGES_S, firm
     return chip
 
 
+def run_phases(config: TableConfig, firmware: Path | None = None) -> None:
+    """Let an edge that changes both bytes of the 16-bit counter fall on each cycle about a tick.
+
+    Raises:
+        PartingError: the tick's sample is torn.
+    """
+    chip = CompiledTable(config, 0, firmware).chip
+    chip.unguard()
+    place = 0.5
+    for _ in range(_BEFORE_CARRY):
+        chip.tick(place, 1.0, place + 1.0, 1)
+        place += 1.0
+    tick_cycles = CLOCK_HZ // config.control.tick_hz
+    for cycle in range(tick_cycles - _CYCLES_ABOUT_A_TICK, tick_cycles):
+        share = cycle / tick_cycles
+        chip.tick(place, 0.5 / share, place + 0.5 / share, 1)  # at this share the shaft is at the edge
+        _check_count(chip, place + 0.5, most=1)
+        chip.tick(place + 1.0, -1.0, place, -1)
+
+
 def _check_count(chip: Chip, counted: float, most: int) -> None:
     count = chip.number("encoder_position", "<i")
-    if abs(count - counted) > most:
-        raise PartingError(f"the firmware counts {count} of {counted:g} edges")
+    if abs(count - math.floor(counted)) > most:
+        raise PartingError(f"the firmware counts {count} of {math.floor(counted)} edges")
 
 
 def _limits(config: TableConfig) -> tuple[float, float]:

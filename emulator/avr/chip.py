@@ -26,6 +26,7 @@ class _Shown(ctypes.Structure):
         ("tick_cycles", ctypes.c_uint64),
         ("ticks", ctypes.c_uint32),
         ("lost_edges", ctypes.c_uint32),
+        ("duty_changes", ctypes.c_uint32),
         ("overrun_bytes", ctypes.c_uint32),
         ("line_count", ctypes.c_int32),
         ("sent_count", ctypes.c_uint32),
@@ -119,6 +120,11 @@ class Chip:
     def lost_edges(self) -> int:
         """Edges of the encoder whose interrupt still waited for the one before."""
         return int(self._shown.lost_edges)
+
+    @property
+    def duty_changes(self) -> int:
+        """Ticks amid which the duty on the bridge became another."""
+        return int(self._shown.duty_changes)
 
     @property
     def overrun_bytes(self) -> int:
