@@ -8,6 +8,7 @@ from hypothesis.strategies import SearchStrategy
 from emulator.config.table_config import TableConfig
 from tools.lockstep import Pair
 
+
 class Sent(NamedTuple):
     """A line, without its CR, and what comes with it."""
 

@@ -5,9 +5,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from tools.prose.python_texts import texts
-
 from protocol.data_file import read_toml
+from tools.prose.python_texts import texts
 
 VOCABULARY = Path(__file__).with_name("vocabulary.toml")
 _CODE = re.compile(
