@@ -64,7 +64,7 @@ class TraceWriter:
 
     Args:
         path: ends in `.csv` or `.npz`.
-        tick_hz: ticks in a simulated second.
+        tick_hz: ticks per simulated second.
 
     Raises:
         TraceError: the file cannot be written at the end, as far as this is known now.

@@ -137,7 +137,7 @@ class Chip:
         return bool(self._shown.line_count)
 
     def take_sent(self) -> bytes:
-        """Return the bytes whose stop bit has left, and forget them."""
+        """Return and remove the bytes whose stop bit has been sent."""
         count = self._shown.sent_count
         if not count:
             return b""

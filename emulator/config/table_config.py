@@ -26,7 +26,7 @@ _COARSER = "a lower encoder.lines or gears.ratio, a higher control.tick_hz or a 
 
 
 class ConfigError(ValueError):
-    """A configuration that cannot be used; the message names the file, the key and what is allowed."""
+    """A configuration that cannot be used. The message names the file, the key and the allowed values."""
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,7 @@ class FaultSchedule:
 
     @property
     def present(self) -> bool:
-        """Whether any fault holds or is to come."""
+        """Whether a fault is active or scheduled."""
         return bool(self._plans or self._active)
 
     @property

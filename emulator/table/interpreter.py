@@ -30,7 +30,7 @@ class Interpreter:
     """Executes commands on a controller's state. It has no state itself."""
 
     def __init__(self, config: TableConfig) -> None:
-        """Take the units and limits of a configured table."""
+        """Store the units and limits of a configured table."""
         limits, power_on = config.limits, config.power_on
         # As they are written in the file: the nearest float of 33.3 is below it, and would refuse `S 33.3`.
         self._speed_limit = simplest_fraction(limits.speed_deg_s)
@@ -44,7 +44,7 @@ class Interpreter:
         self._tick_hz = config.control.tick_hz
 
     def power_on(self) -> Registers:
-        """Return the registers as the controller wakes; the latch holds the position at power-on."""
+        """Return the registers at power-on; the latch holds the position at power-on."""
         return Registers(self._speed(self._first_speed), self._acceleration(self._first_acceleration), 0)
 
     def angle_deg(self, count: int) -> Decimal:

@@ -42,8 +42,8 @@ PLACED = 13
 """Columns of the table of placed bodies."""
 
 
-# Kernels take numbers and arrays, not the model: each array that is fetched from a tuple, and each view of an array,
-# is a counted reference, which costs more than the arithmetic here.
+# Kernels take numbers and arrays, not the model. Each array taken from a tuple, and each view of an array, is a counted
+# reference, which takes longer than the arithmetic.
 
 
 @kernel

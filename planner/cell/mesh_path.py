@@ -60,10 +60,10 @@ def mesh_waypoints(
 
     Args:
         mesh: The part, in mm.
-        kind: Its class.
+        kind: its class.
         pattern: A pattern of that class.
         T_TW: `(4, 4)`, pose of the part on the table; the pattern is created around the table's vertical axis.
-        probe: The probe.
+        probe: the probe.
         layout: layout of the strips.
 
     Raises:

@@ -94,7 +94,7 @@ def configuration_line(label: str, outcome: Outcome) -> str:
 
 
 def report(planned: PlannedScan) -> str:
-    """Return cost, time and margins of a plan, for people."""
+    """Return cost, time and margins of a plan, as text."""
     problem, plan, checked = planned.problem, planned.plan, planned.verification
     cost = plan.cost
     lines = [

@@ -16,7 +16,7 @@ _DEVIATED, _NOT_RUN = 1, 2
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the plan, write what happened, print the verdict, and return the exit status."""
+    """Execute the plan, write the results, print the verdict, and return the exit status."""
     asked = run_options(arguments)
     show = progress_line("run", sys.stderr)
     try:
@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     sys.stdout.write(summary(checked))
     sys.stderr.write(f"{duration}\n")
     if checked.failure is not None:
-        sys.stderr.write(f"what was recorded until then is in {arguments.out}\n")
+        sys.stderr.write(f"the data recorded so far is in {arguments.out}\n")
     return status_of(checked)
 
 

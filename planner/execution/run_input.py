@@ -32,7 +32,7 @@ class RunInput:
         name: name of the scan.
         plan: the motion of the table.
         problem: map, limits and weights.
-        joints_deg: (n + 1, 6) the arm's joints at each location.
+        joints_deg: (n + 1, 6) joints of the arm at each location.
         document: content of the plan file.
     """
 
@@ -75,13 +75,13 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
     map_file = map_file or plan_file.with_name(MAP_FILE)
     if not map_file.is_file():
         raise RunInputError(
-            f"{map_file}: the plan's map is not there; python -m planner map {stored.scan} --out {map_file.parent}"
-            " writes it"
+            f"{map_file}: the map of the plan was not found;"
+            f" to write it: python -m planner map {stored.scan} --out {map_file.parent}"
         )
     maps = load_maps(map_file)
     configuration = Configuration.parse(stored.plan.configuration)
     if configuration not in maps or maps[configuration].metadata.get("digest") != stored.map_digest:
-        raise RunInputError(f"{map_file}: is not the map that {plan_file} was made on; compute map and plan anew")
+        raise RunInputError(f"{map_file}: is not the map of {plan_file}; compute map and plan again")
     problem = Problem(maps[configuration], stored.plan.step_s, stored.limits, stored.weights)
     run_input = RunInput(stored.scan, stored.plan, problem, stored.arm.joints_deg, stored.arm.cell.arm)
     _check(plan_file, run_input)
@@ -113,9 +113,9 @@ def _check(plan_file: Path, run_input: RunInput) -> None:
 def _check_arm(plan_file: Path, run_input: RunInput, stored: StoredPlan) -> None:
     """Refuse a plan that the arm cannot follow, by the file or by this check, or with an arm other than the map's."""
     if run_input.problem.map.metadata.get("arm") != json.loads(json.dumps(asdict(stored.arm.cell.arm))):
-        raise RunInputError(f"{plan_file}: its arm is not the arm that its map was made for; compute map and plan anew")
+        raise RunInputError(f"{plan_file}: its arm is not the arm of its map; compute map and plan again")
     if len(stored.arm.T_WS) != run_input.problem.map.location_count:
-        raise RunInputError(f"{plan_file}: is damaged: it holds {len(stored.arm.T_WS)} poses of the probe")
+        raise RunInputError(f"{plan_file}: is damaged: it contains {len(stored.arm.T_WS)} poses of the probe")
     fault = arm_fault(stored.arm, stored.plan) or stored.arm_fault
     if fault is not None:
         raise RunInputError(

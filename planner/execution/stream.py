@@ -91,7 +91,7 @@ class Encoder:
         piece: Leg,
         first_s: float | None = None,
     ) -> Choice:
-        """Return the command of a piece: its own, or the closest one.
+        """Return the command of a piece: its given one, or the closest one.
 
         Args:
             running: the command before it, as it took effect; None at the start.
@@ -139,7 +139,7 @@ class Streaming:
     """The streaming of one motion, whole or from any of its commands on."""
 
     def __init__(self, motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float) -> None:
-        """Part the motion into the pieces that get a command each; see `stream`."""
+        """Divide the motion into the pieces with one command each; see `stream`."""
         self._encoder = Encoder(motion, limits, wire, run_on_deg, spacing_s(farthest_deg(motion), limits, wire))
         self._pieces = pieces_of(motion, limits, wire, run_on_deg)
 
@@ -153,14 +153,14 @@ class Streaming:
         Args:
             running: the last command that was sent, as it took effect.
             sent: number of commands that were sent.
-            next_s: when the next command takes effect; the running one has been given a target for that.
+            next_s: time at which the next command takes effect; the target of the running one is valid until then.
         """
         return self._chain(running, running.expected, self._pieces[sent:], max(next_s, running.time_s))
 
     def _chain(
         self, running: TimedCommand | None, start: ReferenceState, pieces: Sequence[Leg], first_s: float | None = None
     ) -> Iterator[TimedCommand]:
-        """Yield a command for each piece, when the moment of the next is known: its target depends on that."""
+        """Yield a command for each piece once the time of the next one is known, because its target depends on that."""
         pending: TimedCommand | None = None
         for piece in pieces:
             before = standing_at(start) if running is None else running.reference_at

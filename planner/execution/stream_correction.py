@@ -68,7 +68,7 @@ class FollowedReference:
 
 
 class CorrectedStream(FollowedReference):
-    """The commands of a motion, one after the other. All times are those of the motion.
+    """The commands of a motion, one after the other. All times are in the time of the motion.
 
     Attributes:
         corrections: the points where the commands were computed again.

@@ -83,7 +83,7 @@ class MotionInTime(Protocol):
 
     @property
     def start_deg(self) -> float:
-        """Where the table has to stand, at rest, before the first leg."""
+        """The rest position of the table before the first leg."""
 
     @property
     def start_s(self) -> float:

@@ -124,7 +124,7 @@ class TableWatch:
         A missed trigger costs one profile (`planner.scanning.latching`) and must not stop the table.
         """
         column, self._column = self._column, self._column + 1
-        time_s = self._motion.column_time_s(column)  # a real probe pulled it then
+        time_s = self._motion.column_time_s(column)  # a real probe sent it then
         if self._view is not None:
             time_s = self.now_s()
             self._view.trigger()

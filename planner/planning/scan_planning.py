@@ -26,11 +26,11 @@ class PlannedScan:
     """A scan with the plan of its best arm configuration.
 
     Attributes:
-        scan: What is scanned.
-        problem: Map, limits and weights of that configuration.
-        plan: The table's motion.
-        arm: The arm's motion that belongs to it.
-        outcomes: What the planner answered in each configuration, by name.
+        scan: the scan.
+        problem: map, limits and weights of that configuration.
+        plan: the motion of the table.
+        arm: the matching motion of the arm.
+        outcomes: the result of the planner in each configuration, by name.
     """
 
     scan: Scan
@@ -41,19 +41,19 @@ class PlannedScan:
 
     @property
     def verification(self) -> Verification:
-        """What the execution of the plan would meet."""
+        """The result of a check of the plan before its execution."""
         return verify(self.problem, self.plan)
 
     @property
     def is_executable(self) -> bool:
-        """Whether the table can carry the plan out, nothing forbidden is met, and the arm can follow."""
+        """Whether the table can execute the plan, nothing forbidden is touched, and the arm can follow."""
         return self.verification.is_executable and self.arm.step is None
 
     def save(self, folder: str | Path) -> Path:
-        """Write `plan.json` and `map.npz` into a folder, and return the first: what `python -m planner run` takes.
+        """Write `plan.json` and `map.npz` to a folder. Return the first, which is the input of `python -m planner run`.
 
         Raises:
-            OSError: They cannot be written.
+            OSError: the files cannot be written.
         """
         plan_file = Path(folder) / PLAN_FILE
         plan_file.parent.mkdir(parents=True, exist_ok=True)

@@ -38,7 +38,7 @@ class StoredPlan(NamedTuple):
 
     Attributes:
         scan: what the scan is called.
-        plan: the table's motion.
+        plan: the motion of the table.
         limits: the limits of the table that it was made for.
         weights: the weights of its cost.
         arm: the arm's side of it.
@@ -138,8 +138,8 @@ def _stored(file: Path, document: dict[str, Any]) -> StoredPlan:
     scan = str(document["provenance"]["scan"])
     if "arm" not in document:
         raise PlanFileError(
-            f"{file}: does not hold the arm, so its limits cannot be checked: an earlier version wrote it;"
-            f" plan anew with python -m planner plan {scan} --out {file.parent}"
+            f"{file}: does not contain the arm, so its limits cannot be checked (an earlier version wrote it);"
+            f" create the plan again: python -m planner plan {scan} --out {file.parent}"
         )
     table, cost = document["table"], document["cost"]
     return StoredPlan(

@@ -34,12 +34,12 @@ def fit_sphere(points: FloatArray, radius_mm: float, noise_mm: float = 0.0) -> S
     refused.
 
     Args:
-        points: In mm.
-        radius_mm: The sphere's radius.
-        noise_mm: Standard deviation of the points' heights.
+        points: points in mm.
+        radius_mm: radius of the sphere.
+        noise_mm: standard deviation of the points' heights.
 
     Raises:
-        CalibrationError: There are fewer than 4 points, or two centers fit equally well.
+        CalibrationError: there are fewer than 4 points, or two centers fit equally well.
     """
     if len(points) < _FEWEST_POINTS or not np.isfinite(points).all():
         raise CalibrationError(f"a sphere's center needs at least {_FEWEST_POINTS} points, all of them finite")

@@ -74,7 +74,7 @@ class LiveCommands:
         return self._tracker.begin_s(wire, latched)
 
     def latest_s(self, timed: TimedCommand) -> float:
-        """Return how late a command may be sent."""
+        """Return the maximum delay of a command."""
         return self._tracker.latest_s(timed)
 
     def sent(self, timed: TimedCommand, late_s: float) -> None:

@@ -107,7 +107,7 @@ def track_scan(
 
     Raises:
         PlannerError: there is nothing to begin with; nothing has moved.
-        TableError: the table could not be reached, or not be brought to the start.
+        TableError: the table did not reply, or did not reach the start.
         OSError: the folder cannot be written.
     """
     problem = map_problem(scan, progress_of("distance field"))

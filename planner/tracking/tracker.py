@@ -53,8 +53,8 @@ class TrackSettings(NamedTuple):
         view: columns that are known ahead of the table at most.
         margin_deg: distance that the table keeps from what is forbidden.
         reconfigure: whether a pause may change the arm's configuration where the path goes on in no other way.
-        pause_times: how long the robot takes in a pause.
-        run_on_deg: how far the table may run on when the line dies.
+        pause_times: duration of the robot's actions in a pause.
+        run_on_deg: maximum angle that the table may run on if the line fails.
         lag_s: see `planner.execution.execute.Settings`, as for the next three.
         lead_s: see there.
         drift_deg: see there.
@@ -172,7 +172,7 @@ class Tracker(FollowedReference):
             step_s: time from one location to the next.
             limits: of the table.
             weights: of Eq. (5); None takes the default for the limits.
-            wire: what the commands have to pass.
+            wire: properties of the serial line.
             settings: how the path is tracked.
             configurations: those that the start is chosen among.
             angle_count: table angles of a column.

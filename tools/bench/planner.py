@@ -35,7 +35,7 @@ from planner.table.motion import Limits
 from tools.bench.default_planner import bench_default_planner, lattice_optimum
 from tools.bench.planner_families import FAMILIES
 
-# All planners are compared on the first families, on which ray shooting gets along.
+# All planners are compared on the first families, on which ray shooting finds plans.
 COMPARED_FAMILIES = 11
 
 

@@ -87,7 +87,7 @@ class MomentsPort:
 
     @property
     def in_waiting(self) -> int:
-        """The number of bytes that can be read at once."""
+        """The number of bytes that can be read without waiting."""
         return self._inner.in_waiting
 
     def read(self, size: int, /) -> bytes:

@@ -14,7 +14,7 @@ class UsageError(Exception):
 
 
 def say(sentence: str) -> None:
-    """Tell the person at the terminal, if there is one."""
+    """Print a line for the user, if the output is a terminal."""
     ending.say("conformance", sentence)
 
 

@@ -75,7 +75,7 @@ def load_profile(path: Path | None = None) -> Profile:
 
 
 def profile_from(values: Mapping[str, Any], source: str) -> Profile:
-    """Return the profile that plain values, complete, describe; see `load_profile`."""
+    """Return the profile from complete plain values; see `load_profile`."""
     return _profile(TomlTable(source, values, error=ProfileError), {})
 
 

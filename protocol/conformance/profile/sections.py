@@ -6,7 +6,7 @@ from typing import Any
 from protocol.toml_section import quantity
 
 
-def _amount() -> Any:  # noqa: ANN401  # stands for a value of the annotated type
+def _amount() -> Any:  # noqa: ANN401  # returned in place of a value of the annotated type
     """Declare a number that is not negative."""
     return quantity(at_least=0)
 

@@ -57,7 +57,7 @@ def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
             "diameter_cm = 16",
             "workpiece.diameter_mm is missing; it must be a finite number above 0",
         ),
-        ("diameter_mm = 160", "diameter_mm = 160\ncolor = 1", "workpiece.color is not a key; allowed are class,"),
+        ("diameter_mm = 160", "diameter_mm = 160\ncolor = 1", "workpiece.color is not a known key; known are class,"),
         (
             "diameter_mm = 160",
             "diameter_mm = -160",
@@ -85,11 +85,11 @@ def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
         (
             "[limits]",
             "[limit]",
-            "limit is not a key; allowed are cell, limits, path, value, weights, work",
+            "limit is not a known key; known are cell, limits, path, value, weights, work",
         ),
-        ("[workpiece]", "[workpeice]", "workpeice is not a key; allowed are cell, limits, path, value,"),
+        ("[workpiece]", "[workpeice]", "workpeice is not a known key; known are cell, limits, path, value,"),
         ("[workpiece]", "[WORKPIECE]", "value, weights, workpiece; did you mean workpiece?"),
-        ("[workpiece]", "[part]", "part is not a key; allowed are cell,"),
+        ("[workpiece]", "[part]", "part is not a known key; known are cell,"),
         ("class =", "clas =", "workpiece.clas is not a known key; did you mean class? workpiece.class is missing"),
         (
             "scan_speed_mm_s = 30",
