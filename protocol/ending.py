@@ -17,7 +17,7 @@ def ended(name: str, work: Callable[[], int], *expected: type[Exception], interr
         name: name of the command, at the start of that line.
         work: returns the exit status.
         expected: the errors with a message for the user.
-        interrupted: What the line says after a signal.
+        interrupted: text of the line after a signal.
     """
     try:
         with ended_by_signals() as ending:

@@ -1,7 +1,7 @@
 """Machine code that is kept between runs: a file for each function and the types of its arguments.
 
-A file's name holds the digest of everything that the code was made from (`code_digest`), so a change of it is a new
-file, and a change of a comment is not.
+A file's name contains the digest of everything that determines the code (`code_digest`). So a change of the code gives
+a new file, and a change of a comment does not.
 """
 
 import sys

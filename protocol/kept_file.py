@@ -1,9 +1,9 @@
 """Files with what can be computed again, kept between runs for all checkouts and versions of a user.
 
-A file's name says what it was computed from, so it is never stale, and any number of processes may write and read it at
-once. What is read steers machines, and machine code runs without further checks: a file is used only if it is whole,
-was written under its name, and belongs to this user, whom alone it lets write. Else, or where the folder cannot be read
-or written, or is full, its content is computed again: that costs time only.
+A file's name identifies the input of its computation, so it is never stale. Any number of processes may write and read
+it at once. The content controls machines, and machine code runs without further checks. So a file is used only if it is
+complete, was written under its name, belongs to this user, and is not writable for others. Otherwise, or if the folder
+cannot be used or is full, the content is computed again, which costs only time.
 """
 
 import hashlib

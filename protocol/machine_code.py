@@ -1,8 +1,8 @@
 """Compile functions with numba, and keep their machine code between runs under what they are (`code_digest`).
 
-Numba's own cache asks only whether the file of the *called* function has changed, so it would go on running old code of
-a function that is called in another file; and two processes that compile at once may exchange two signatures' code.
-This module needs numba; nothing imports it before something has to be compiled.
+Numba's own cache checks only whether the file of the *called* function has changed. So it would run old code of a
+function that is called in another file. Also two processes that compile at once may exchange the code of two
+signatures. This module needs numba; nothing imports it before something has to be compiled.
 """
 
 import gc
@@ -59,7 +59,7 @@ def within_type(function: Callable[..., Any]) -> Any:  # noqa: ANN401  # numba's
 
 
 def inlined(function: Callable[..., Any]) -> None:
-    """Let numba compile a plain function where a compiled one calls it, in the place of the call."""
+    """Let numba compile a plain function into its compiled callers, instead of a call."""
     register_jitable(**_INLINED_OPTIONS)(function)
 
 
@@ -177,7 +177,7 @@ _PLAIN_TYPES = (
 
 
 def _type_parts(kind: Any) -> tuple[Any, ...]:  # noqa: ANN401  # numba's
-    """Return what tells a type from all others."""
+    """Return a text that distinguishes a type from all others."""
     if isinstance(kind, _types.BaseTuple):
         named = (kind.instance_class.__module__, kind.instance_class) if isinstance(kind, _types.BaseNamedTuple) else ()
         return (type(kind).__name__, named, *map(_type_parts, kind.types))

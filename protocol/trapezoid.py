@@ -1,7 +1,7 @@
 """The trapezoidal velocity profile that P, S and A prescribe, in closed form (section 2.1; clauses 7.1 and 7.3).
 
-A table's controller plans nothing ahead. At any moment its reference takes the maximum speed that A, S and the distance
-left to brake allow, from the position and the speed that it has. So the reference is known from a command until it
+A table's controller plans nothing ahead. At any time its reference moves at the maximum speed that A, S and the
+remaining braking distance allow, from its present position and speed. So the reference is known from a command until it
 stands: a few segments of constant acceleration. This is not the code of a table.
 """
 

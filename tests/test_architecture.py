@@ -193,7 +193,7 @@ def test_the_files_beside_the_rooms_need_none_of_them(package: str) -> None:
 
 
 CORE = ("plant", "firmware", "line")
-"""The rooms of the emulator that another simulator may take over: they take constants as values and know no file."""
+"""The rooms of the emulator that another simulator may use: they take constants as values and read no file."""
 
 
 @pytest.mark.parametrize("room", CORE)

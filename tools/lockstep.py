@@ -65,7 +65,7 @@ _CYCLES_ABOUT_A_TICK = 420
 
 
 class PartingError(Exception):
-    """The two did not do the same; the message says when and what."""
+    """Firmware and emulator differ. The message states the time and the difference."""
 
 
 @dataclass
@@ -219,8 +219,9 @@ def random_line(chance: Random, config: TableConfig) -> bytes:
 
 
 def run_edges(config: TableConfig, ticks: int, edges_s: int = MOST_EDGES_S, firmware: Path | None = None) -> Chip:
-    """Turn the shaft at a constant speed both ways, at any cycle of a tick, while the controller brakes and the line is
-    busy, and return the controller.
+    """Turn the shaft at a constant speed in both directions, at any cycle of a tick, and return the controller.
+
+    Meanwhile the controller brakes and the line is busy.
 
     Raises:
         PartingError: its count is not that of the edges.

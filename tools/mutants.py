@@ -1,7 +1,7 @@
 """Random mutations of the emulated table that the conformance suite does not find.
 
 `python -m tools.mutants --seed N --count N` changes one operator, constant, condition or statement of the table's code
-at a time, in memory, and runs the suite against that table until a case fails. It prints mutants that pass. Those that
+at a time, in memory. It runs the suite against that table until a case fails. It prints mutants that pass. Those that
 may pass are listed with the reason in `mutants.toml`.
 """
 

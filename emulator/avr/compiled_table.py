@@ -176,7 +176,7 @@ class CompiledTable:
         self._load_torque_Nm, self._resting = float(torque_Nm), False
 
     def reset(self, count: int = 0) -> None:
-        """Switch the table off and on: the controller wakes at `count` where the plant is; the plant goes on.
+        """Switch the table off and on. The controller starts at `count`, and the plant continues.
 
         A count other than 0 is written by a debugger that halts at main(); a controller of its own begins at 0.
         """

@@ -16,7 +16,7 @@ _SYMBOL_TABLE = 2
 
 
 class ElfError(ValueError):
-    """The file is not an ELF file for an AVR controller; the message says why."""
+    """The file is not an ELF file for an AVR controller. The message states the reason."""
 
 
 class Program(NamedTuple):

@@ -1,7 +1,7 @@
 """Building the firmware, and the simulator's library, with the compilers of the distribution.
 
-What was built is kept in the user's cache folder under a digest of everything that it was made of, and appears there
-only when it is whole.
+Build results are stored in the user's cache folder under a digest of all their inputs. A result appears there only when
+it is complete.
 """
 
 import hashlib

@@ -1,8 +1,9 @@
 """The scanning cell: the frames, their placements, and the arm's goal for every location and table angle.
 
-Frames: B base of the arm, T table (origin in the middle of its top, z along its axis), W workpiece (turns with the
-table), F flange. S sensor is the probe: origin at the laser's exit, +Z along the beam, +X along the laser line, +Y the
-scan direction. Placements are rigid transformations: `T_BT` is the pose of T in B.
+Frames: B is the base of the arm. T is the table, with its origin in the middle of its top, and z along its axis. W is
+the workpiece, which turns with the table. F is the flange. S is the sensor, that is, the probe. Its origin is at the
+laser's exit, +Z along the beam, +X along the laser line, +Y in the scan direction. Placements are rigid
+transformations: `T_BT` is the pose of T in B.
 """
 
 from dataclasses import dataclass, field

@@ -4,8 +4,8 @@ The protocol limits the resolution of the command. From the time of the command 
 speed v to S at the rate A, and then keeps S. Before that time, it keeps v.
 
 So in a step it travels farther by (S - v) r than without the command. Here r is the time from the middle of the ramp to
-the end of the step. The time of the command therefore determines the position at the end of the step with the
-resolution of the clock, although S and A are coarse.
+the end of the step. Therefore the time of the command determines the position at the end of the step. Its resolution is
+that of the clock, although S and A are coarse.
 
 A ramp in the middle of a step ends at the same angle and the same speed as the plan's acceleration over the whole step.
 So A may be larger than the plan's, which keeps the table's run-on short (`run_on`).

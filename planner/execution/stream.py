@@ -1,9 +1,10 @@
 """From a planned motion to timed commands: one `A`, `S`, `P` for each step; no I/O.
 
-The wire carries one decimal. Rounding each value on its own would let the errors add up, so each step starts from where
-the reference is *predicted* to be, exactly, after all commands before it (`protocol.trapezoid`), and takes the S, the A
-and the moment that bring it nearest to the plan at the step's end (`closest_command`): what one step could not say, the
-next one takes out. Steps that are too long for one command get several (`pieces`).
+The protocol transmits one decimal. If each value were rounded on its own, the errors would add up. Therefore each step
+starts from the *predicted* position of the reference, exactly, after all earlier commands (`protocol.trapezoid`). It
+uses the S, the A and the time that bring the reference nearest to the plan at the step's end (`closest_command`). So
+the next step corrects the rounding error of the previous one. Steps that are too long for one command get several
+(`pieces`).
 """
 
 import math

@@ -191,8 +191,8 @@ def look_up(values: NDArray[np.float32], levels: FloatArray, x: float, y: float,
     mean of the squared distances from the cell's corners, at most 3/4 of a squared spacing. The error of the
     interpolated distance d is at most e. Far from the mesh the bound is better. The squared distance from any set,
     minus the squared length of the point's vector, is a minimum of linear functions and therefore concave. So the true
-    distance is at least sqrt(d2 - e2). Beyond all grids, the distance to the mesh is the longest side of a triangle
-    with an obtuse angle at the nearest point of the coarsest grid's box.
+    distance is at least sqrt(d2 - e2). Beyond all grids, consider the nearest point of the coarsest grid's box. The
+    distance to the mesh is the longest side of a triangle with an obtuse angle at that point.
 
     Args:
         values: see `SignedDistanceField`.

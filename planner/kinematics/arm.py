@@ -46,8 +46,8 @@ class Arm:
         offset_deg: angle in the table when the robot's own angle is 0.
 
     Raises:
-        ArmTableError: the arm is not ortho-parallel with a spherical wrist, which the closed-form inverse kinematics
-            need, or its limits are inconsistent, or a sign is not 1 or -1.
+        ArmTableError: the arm is not ortho-parallel with a spherical wrist, its limits are inconsistent, or a sign is
+            not 1 or -1. The closed-form inverse kinematics need such an arm.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """Transform profiles into the workpiece's frame, from the robot's pose and the table's angle latched at their trigger.
 
-T_WS = inv(T_TW) Rz(-theta) inv(T_BT) T_BF T_FS: the robot carries the probe (S) on its flange (F), the table (T) turns
-the workpiece (W), and both are in the robot's base frame (B).
+T_WS = inv(T_TW) Rz(-theta) inv(T_BT) T_BF T_FS. The robot carries the probe (S) on its flange (F), and the table (T)
+turns the workpiece (W). Both are in the robot's base frame (B).
 """
 
 from dataclasses import dataclass

@@ -119,9 +119,9 @@ def _budget_table(budget: ErrorBudget) -> str:
 def _rounding(scanned: Scanned) -> str:
     budget, decimals = scanned.budget, scanned.options.decimals
     return (
-        f"Rounding in closed form: an angle that is wrong by anything within one step of {10.0**-decimals:g} deg has"
-        f" sigma {10.0**-decimals:g}/sqrt(12) deg, which at these points' radius of {budget.radius_mm:.1f} mm (rms)"
-        f" is {_um(budget.rounding_mm, 2)} µm."
+        f"Rounding in closed form: an angle error within one step of {10.0**-decimals:g} deg has"
+        f" sigma {10.0**-decimals:g}/sqrt(12) deg. At the points' radius of {budget.radius_mm:.1f} mm (rms)"
+        f" this is {_um(budget.rounding_mm, 2)} µm."
     )
 
 

@@ -139,7 +139,7 @@ def costs_of_starts(online: OnlineStep, window: Window) -> FloatArray:
 
 
 def _order(rests: IndexArray, costs: FloatArray, accelerations: FloatArray) -> list[int]:
-    """Return the safe steps by cost; where nothing is said of their cost, by their acceleration."""
+    """Return the safe steps by cost; without a known cost, by their acceleration."""
     keys = np.where(np.isfinite(costs), costs, np.inf)
     order = np.lexsort((np.where(np.isinf(keys), np.abs(accelerations), 0.0), keys))
     return [int(i) for i in order if rests[i] != NO_REST]

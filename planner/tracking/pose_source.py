@@ -1,7 +1,7 @@
 """Where scan locations come from: a path that is known, or a program's lines on stdin or a loopback TCP port.
 
-A source is read only as far as there is room in the window, so a program that sends faster than the table moves is held
-back by its pipe, and memory stays flat.
+A source is read only as far as there is space in the window. So the pipe blocks a program that sends faster than the
+table moves, and the memory stays constant.
 """
 
 import os
@@ -30,7 +30,7 @@ class PoseSource(Protocol):
         """Return up to `room` locations (4, 4), after waiting for the first at most `wait_s` of real time.
 
         Raises:
-            SourceError: what came is no location, or the source died.
+            SourceError: the line is not a location, or the source failed.
         """
 
     @property

@@ -46,14 +46,14 @@ class TrackRecord:
         self._file.close()
 
     def revealed(self, column: Column) -> None:
-        """Take note of a column; one that is known already replaces the earlier one."""
+        """Record a column; a column that is already known replaces the earlier one."""
         self._angle_count = len(column.values)
         self._file.seek(column.location * 9 * self._angle_count)
         self._file.write(column.values.tobytes() + column.reasons.tobytes())
         self.T_WS[column.location : column.location + 1] = [column.T_WS]
 
     def tracked(self, tracked: Tracked, seconds: float) -> None:
-        """Take note of a command, and of the step that it begins."""
+        """Record a command, and the step that it starts."""
         for column in tracked.recounted:
             self.revealed(column)
         leg = tracked.command.leg

@@ -1,4 +1,4 @@
-"""A path tracked on the table at a port, from the first view to the files that tell of it."""
+"""A path tracked on the table at a port, from the first view to the output files."""
 
 import gc
 import time

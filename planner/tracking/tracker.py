@@ -1,9 +1,8 @@
 """Track a path that becomes known while the table moves: locations and time go in, commands and joint targets come out.
 
-No I/O and no clock: `python -m planner track` and other programs call `reveal` when a location arrives and `next` when
-`begin_s` has come, send the command that is returned at its time, and report it with `sent`. The commands are encoded
-as those of `python -m planner run` are: each from where the reference is predicted to be, corrected by what the
-encoder reads.
+No I/O and no clock. `python -m planner track` and other programs call `reveal` when a location arrives, and `next` when
+`begin_s` has come. They send the returned command at its time, and report it with `sent`. The commands are encoded as
+in `python -m planner run`: each from the predicted reference, corrected by the readings of the encoder.
 """
 
 from collections import deque
@@ -165,7 +164,7 @@ class Tracker(FollowedReference):
         configurations: Sequence[Configuration] = tuple(Configuration),
         angle_count: int = 360,
     ) -> None:
-        """Know no location yet.
+        """Start without a known location.
 
         Args:
             problem: the cell; its own locations do not count.
@@ -225,7 +224,7 @@ class Tracker(FollowedReference):
         return self._settings
 
     def map_metadata(self, T_WS: FloatArray) -> Mapping[str, object]:
-        """Return what a map of locations (n, 4, 4) says of itself, but for its configuration."""
+        """Return the metadata of a map of locations (n, 4, 4), without its configuration."""
         return self._rater.metadata(T_WS)
 
     @property
@@ -253,7 +252,7 @@ class Tracker(FollowedReference):
         return column
 
     def end(self) -> None:
-        """Take note that no more locations come."""
+        """Record that no more locations come."""
         self._ended = True
         if self._planner is not None:
             self._planner.ended = True

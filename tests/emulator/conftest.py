@@ -76,7 +76,7 @@ def _wait_until() -> Callable[[Callable[[], bool]], None]:
 
 @pytest.fixture
 def warnings() -> list[str]:
-    """What a port said to the person who runs the emulator; its `append` is the port's `warn`."""
+    """The warnings of a port to the user of the emulator; its `append` is the port's `warn`."""
     return []
 
 
@@ -99,7 +99,7 @@ def opened() -> Iterator[Callable[[str], int]]:
 
 @pytest.fixture
 def bench() -> Bench:
-    """A table for faults to strike, with its port and its client."""
+    """A table for fault injection, with its port and its client."""
     return Bench()
 
 

@@ -1,4 +1,4 @@
-"""A table in virtual time with its port and its client, for faults to strike."""
+"""A table in virtual time with its port and its client, for fault injection."""
 
 from emulator.faults.fault import fault_from
 from emulator.protocol_emulator import Serial

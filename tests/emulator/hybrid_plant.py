@@ -35,7 +35,7 @@ class Event:
 
 
 class Leg(NamedTuple):
-    """What a stretch of constant voltage and load led to; speeds and accelerations as the motor would have them."""
+    """The result of a segment of constant voltage and load; speeds and accelerations are at the motor."""
 
     state: NDArray[np.float64]
     events: int

@@ -134,7 +134,7 @@ def test_a_script_that_reads_one_line_and_no_more_does_not_stop_it() -> None:
     assert process.stdout is not None
     name = process.stdout.readline().strip()
     process.stdout.close()
-    with open_port(name, 4800) as port:  # a reason to speak to nobody
+    with open_port(name, 4800) as port:  # a reason to refuse all connections
         port.write(b"H\r")
         port.baudrate = 9600
         time.sleep(0.1)

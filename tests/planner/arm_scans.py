@@ -39,7 +39,7 @@ def winding_scan(folder: Path) -> Path:
 
 
 def hasty_scan(folder: Path) -> Path:
-    """Joint 6 is too fast: 630 deg/s to and fro, of 600. The table has to take over 30 deg/s."""
+    """Joint 6 is too fast: 630 deg/s back and forth, of 600. The table has to take over 30 deg/s."""
     rolls = [0.0] * 8 + [63.0] * 10 + [0.0] * 10 + [-63.0] * 10
     return write_rolling_scan(folder, "hasty", rolls, step_s=0.1)
 

@@ -23,7 +23,7 @@ def motion(start: tuple[float, float], accelerations: Sequence[float], step_s: f
 
 
 def is_forbidden_on_the_way(configuration_map: ConfigurationMap, plan: Plan) -> bool:
-    """Tell whether any of many sub-steps of any step outside pauses, or any column, is forbidden."""
+    """Return whether any of many sub-steps of any step outside pauses, or any column, is forbidden."""
     paused = {pause.step for pause in plan.pauses}
     for k, a in enumerate(plan.accelerations_deg_s2):
         for fraction in np.linspace(0.0, 1.0, SUB_STEPS + 1) if k not in paused else (1.0,):

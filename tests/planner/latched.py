@@ -28,7 +28,7 @@ def swinging_plan(seconds: float = 4.0, acceleration_deg_s2: float = 10.0) -> Pl
 
 
 def joints_along(plan: Plan) -> FloatArray:
-    """Return joints that say at which time they are: a degree a second."""
+    """Return joints that encode the time: a degree per second."""
     times_s = plan.step_s * np.arange(len(plan.angles_deg))
     return np.tile(times_s[:, np.newaxis], (1, 6))
 

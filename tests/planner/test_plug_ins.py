@@ -229,6 +229,6 @@ def test_a_factor_that_cannot_count_is_refused_by_name_in_one_line(
 
 def test_a_planner_by_api_is_checked_as_well() -> None:
     scan = planner.load_scan("cylinder")
-    broken: Callable[[planner.Problem], planner.Plan] = lambda _problem: None  # type: ignore[assignment, return-value]  # noqa: E731  # broken on purpose
+    broken: Callable[[planner.Problem], planner.Plan] = lambda _problem: None  # type: ignore[assignment, return-value]  # noqa: E731  # broken deliberately
     with pytest.raises(PlugInError, match="returned None; it must return a Plan or a NoPlan"):
         planner.plan(scan, broken, "LEFTY-ABOVE-NOFLIP", 60)

@@ -80,7 +80,7 @@ def turns_after(
 
 
 def flange_spins(wrist_deg: FloatArray) -> bool:
-    """Tell whether a wrist that goes from joints (3,) to joints (3,), in proportion, takes the flange the long way."""
+    """Return whether a wrist that moves proportionally between two joints (3,) rotates the flange the long way."""
     shares = np.linspace(0.0, 1.0, 200)[:, np.newaxis]
     quaternions = Rotation.from_euler(
         "ZYZ", wrist_deg[0] + shares * (wrist_deg[1] - wrist_deg[0]), degrees=True

@@ -1,6 +1,6 @@
 """A table in virtual time, whose replies meet the fates that a test gives them.
 
-The table answers H and L with the number of lines that it has heard, so a reply tells which line it answers.
+The table answers H and L with the number of lines that it has received, so a reply identifies its line.
 """
 
 from collections import deque

@@ -1,4 +1,4 @@
-"""Question and answer over a line that loses, delays and spoils replies: the next answer is always the right one."""
+"""Commands and replies over a line that loses, delays and garbles replies: each command has its own reply."""
 
 from contextlib import suppress
 from decimal import Decimal
@@ -163,7 +163,7 @@ def test_no_answer_is_ever_that_to_another_command(
 
 
 def say_and_check(client: TableClient, port: TablePort, what: str) -> None:
-    """Let the client say something; the answer must be that to the line which the table has heard last."""
+    """Let the client send a command; the reply must belong to the line that the table has received last."""
     match what:
         case "H":
             assert client.position_deg() == len(port.heard)

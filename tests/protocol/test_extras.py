@@ -1,4 +1,4 @@
-"""A program whose extra is missing says which one to install, and how."""
+"""A program with a missing extra states which one to install, and how."""
 
 import os
 import re

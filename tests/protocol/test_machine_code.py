@@ -1,4 +1,4 @@
-"""Machine code is kept under what it is: a small package is edited, and each run says how much was compiled."""
+"""Machine code is stored under its digest: a small package is edited, and each run prints how much was compiled."""
 
 import os
 import pickle

@@ -29,7 +29,7 @@ class Stopped:
 
     @property
     def beyond_deg(self) -> float:
-        """How much farther than from the present speed at the greatest A."""
+        """How much farther than from the present speed at the maximum A."""
         return self.way_deg - self.speed_deg_s**2 / (2 * self.rate_deg_s2)
 
     @property

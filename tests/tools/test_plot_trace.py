@@ -81,7 +81,7 @@ def test_a_part_of_the_trace_and_of_its_signals_is_drawn(trace_path: Path) -> No
 
 
 def test_a_part_in_which_nothing_changes_is_a_line(trace_path: Path) -> None:
-    """The trace holds a stretch at rest as its first and last tick alone."""
+    """The trace contains only the first and the last tick of a rest."""
     figure = draw_trace(read_trace(trace_path), from_s=0.1, to_s=0.4, signals=("encoder_deg",))
 
     (curve,) = (line for line in figure.axes[0].lines if line.get_label() == "encoder")

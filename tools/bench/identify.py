@@ -162,7 +162,7 @@ def _record_over(port: str) -> WireRecording:
 
 
 def _identified(known: Path, truth: Path, recording: WireRecording) -> Outcome:
-    """Return the result of a fit that knows only some of the constants."""
+    """Return the result of a fit in which only some of the constants are known."""
     assumed, true = load_config(known), load_config(truth)
     begin_s = time.process_time()
     refused, constants = "", {}

@@ -193,7 +193,7 @@ def bench(stream: TextIO, every: int = EVERY) -> None:
             )
         )
     header = ("scan", "stops", "deg/s", "deg beyond v^2/2A", "s beyond v/A", "deg back", "wrong",
-              "cut: deg on", "s on", "deg from what was said")  # fmt: skip
+              "cut: deg on", "s on", "deg from the reported angle")  # fmt: skip
     print_table(stream, "Stops and cut lines along the shipped plans, worst figures", header, rows)
 
 

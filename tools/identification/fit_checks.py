@@ -84,9 +84,9 @@ def _check_residual(found: Identified) -> None:
         return
     raise RecordingError(
         f"the model does not explain the recording: beyond rounding {rms_deg:.2g} deg rms ({rms_deg / count_deg:.2g} "
-        f"counts) are left (allowed {MOST_UNEXPLAINED_DEG:g} deg), {_where(found)}; a step or drift of the clock, a "
-        "changed load or table, a table that was turned by hand, an encoder that lost counts, other gains, gears or "
-        "encoder than configured, or a search that ended in a wrong place: record again"
+        f"counts) are left (allowed {MOST_UNEXPLAINED_DEG:g} deg), {_where(found)}; possible causes: "
+        "a step or drift of the clock, a changed load or table, a table that was turned by hand, an encoder that lost "
+        "counts; other gains, gears or encoder than configured; a search with a wrong result; record again"
     )
 
 

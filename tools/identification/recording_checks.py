@@ -190,7 +190,7 @@ def _stray(time_s: Array, seen_deg: Array, predicted_deg: Array) -> _Fault | Non
     elif _AS_FAR[0] < ratio < _AS_FAR[1]:
         reason = (
             f"it is up to {np.abs(seen_deg - predicted_deg).max():.2g} deg away: a missing or changed command, a step "
-            "of the clock, mixed-up rows, a sign, or motion too fast for the table (record with a lower --speed)"
+            "of the clock, mixed-up rows, a sign; or motion too fast for the table (record with a lower --speed)"
         )
     else:
         reason = (

@@ -12,19 +12,19 @@ VOCABULARY = Path(__file__).with_name("vocabulary.toml")
 _CODE = re.compile(
     r"^```(?s:.*?)^```|(?:^\n|\A)(?:^ {4,}[^\n]*\n)+|`[^`]*`|\[\S*\.md\]\([^)]*\)|\]\([^)]*\)", re.MULTILINE
 )
-"""What is not prose in Markdown: blocks and spans of code, and the targets of links."""
+"""The part of Markdown that is not prose: blocks and spans of code, and the targets of links."""
 
 
 MOST_WORDS = 25
-"""Words of a sentence, at most."""
+"""Maximum number of words of a sentence."""
 
 _WORD = re.compile(r"[A-Za-z][\w'/-]*")
-_SENTENCE_END = re.compile(r"[.!?;:](?=\s|$)|\n\s*\n|\n(?=\s*[-|])")
-"""The end of a sentence or a paragraph, or the start of the next item of a list."""
+_SENTENCE_END = re.compile(r"[.!?;:](?=\s|$)|\n\s*\n|\n(?=\s*(?:[-|]|python ))")
+"""The end of a sentence or a paragraph, or the start of the next item of a list or command line."""
 
 
 class Rule(NamedTuple):
-    """A pattern, and what to write where it is found."""
+    """A pattern, and what to write instead."""
 
     pattern: re.Pattern[str]
     instead: str
@@ -42,7 +42,7 @@ def load_rules(file: Path = VOCABULARY) -> tuple[Rule, ...]:
     """Return the rules of a vocabulary.
 
     Raises:
-        DataFileError: The file cannot be read.
+        DataFileError: the file cannot be read.
     """
     sections: Mapping[str, Mapping[str, str]] = read_toml(file)
     return tuple(
@@ -53,7 +53,7 @@ def load_rules(file: Path = VOCABULARY) -> tuple[Rule, ...]:
 
 
 def findings(text: str, rules: tuple[Rule, ...], *, markdown: bool) -> Iterator[Finding]:
-    """Yield what a text breaks, line by line; a phrase may run over the end of a line."""
+    """Yield the findings in a text by line; a phrase may continue on the next line."""
     prose = _CODE.sub(lambda match: re.sub(r"[^\n]", "\0", match[0]), text) if markdown else text
     found = [(match.start(), match[0], rule.instead) for rule in rules for match in _in_one_line(prose, rule)]
     for start, words, instead in sorted(found):
@@ -61,13 +61,14 @@ def findings(text: str, rules: tuple[Rule, ...], *, markdown: bool) -> Iterator[
 
 
 def python_findings(source: str, rules: tuple[Rule, ...], *, messages: bool = True) -> Iterator[Finding]:
-    """Yield what the docstrings, the comments and, if wanted, the messages of a Python file break.
+    """Yield the findings in the docstrings, the comments and, if wanted, the messages of a Python file.
 
     Raises:
         SyntaxError: the source is not Python.
     """
     for line, text in texts(source, messages=messages):
-        for finding in (*findings(text, rules, markdown=True), *long_sentences(text)):
+        prose = f"{text}\n"
+        for finding in (*findings(prose, rules, markdown=True), *long_sentences(prose)):
             yield finding._replace(line=line + finding.line - 1)
 
 

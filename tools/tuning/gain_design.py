@@ -73,7 +73,7 @@ def scan(loops: Loops) -> Scan:
 
 
 def design(scanned: Scan, bounds: tuple[Bound, ...], objective: Objective, zooms: int = ZOOMS) -> Design:
-    """Return the gain set with the least `objective` within the bounds.
+    """Return the gain set with the minimum `objective` within the bounds.
 
     Args:
         scanned: the coarse scan of the table's loops.

@@ -250,9 +250,9 @@ def _differences(tuning: Tuning) -> list[str]:
         others = ", ".join(f"{value:.3g} without {effect}" for effect, value in without.items())
         texts.append(
             f"{differing.title}: {differing.emulator:.3g} {differing.unit}; the model predicts {differing.model:.3g}."
-            f" On the emulator it would be {others}. What then still differs is the rounding, of the speed to quanta"
-            f" of {quantum:.3g} deg/s and of the PWM, the dry friction of a table that comes to a stand or turns back, "
-            "and a duty that is at its limit."
+            f" On the emulator it would be {others}. The remaining differences are due to the rounding of the speed"
+            f" to steps of {quantum:.3g} deg/s and of the PWM. Other causes are the dry friction of a table that stops"
+            " or reverses, and a duty at its limit."
         )
     return texts
 
@@ -276,7 +276,7 @@ def _noise(tuning: Tuning) -> str:
     count_deg, duty = quantization_noise(tuning.before)
     return (
         f"The position is rounded to counts, a white noise of {count_deg:.2g} deg (standard "
-        "deviation), which the regulator turns into the noise at the PWM on a ramp. At a constant speed the rounding "
+        "deviation). The PID turns it into the noise at the PWM on a ramp. At a constant speed the rounding "
         "repeats, and is a sawtooth instead: the bound holds for the worst speed. The PWM is rounded to "
         f"steps, a white noise of {100 * duty:.2g} % duty at the plant's input."
     )

@@ -19,7 +19,7 @@ TICK_S = 0.001
 DEG = ONE * 512  # one degree, with 26 fraction bits, on the default table
 DEG_S = DEG * TICK_S
 DEG_S2 = DEG_S * TICK_S
-SPEED_LIMIT = round(60.5 * DEG_S)  # the most that the registers hold
+SPEED_LIMIT = round(60.5 * DEG_S)  # the maximum of the registers
 STANDING = Reference(0, 0, 0, 0, 0)
 
 speeds = st.integers(1, SPEED_LIMIT)
@@ -71,8 +71,8 @@ def random_motion(chance: random.Random) -> tuple[Profile, int]:
 def test_pre_empted_motions_are_those_that_ruckig_plans(seed: int) -> None:
     """500 motions a seed, each interrupting the one before at a random instant.
 
-    Ruckig changes its acceleration at any instant, the profiler only between ticks: a change that falls within a tick
-    is a tick's average, so speeds differ by less than the acceleration times half a tick, and positions by less than
+    Ruckig changes its acceleration at any instant, the profiler only between ticks. A change within a tick becomes the
+    average of the tick. So speeds differ by less than the acceleration times half a tick, and positions by less than
     the acceleration times half a tick squared. Such differences do not add up: the profiler looks ahead at each tick.
     """
     chance = random.Random(seed)  # noqa: S311  # a test's draw

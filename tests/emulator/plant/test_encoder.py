@@ -51,7 +51,7 @@ def test_a_counter_that_is_set_keeps_the_edges_where_they_are(
 
 
 def smooth(before: DriveState, after: DriveState) -> bool:
-    """Tell whether a tick went without an impact, a separation or a stop."""
+    """Return whether a tick went without an impact, a separation or a stop."""
     return before.contact == after.contact and before.speed_rad_s * after.speed_rad_s > 0.0
 
 

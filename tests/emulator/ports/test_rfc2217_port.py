@@ -1,4 +1,4 @@
-"""The port that speaks telnet: settings travel, bytes come through whole, and no client brings it down."""
+"""The telnet port: it transmits settings and all bytes, and no client can make it fail."""
 
 import random
 import socket

@@ -1,4 +1,4 @@
-"""The loop that serves the table, with a wall clock and clients that do as they are told."""
+"""The server loop of the table, with a simulated wall clock and scripted clients."""
 
 import os
 import socket

@@ -51,7 +51,7 @@ def test_interpreted_and_compiled_agree_to_the_last_bit(seed: int) -> None:
 
 
 def test_a_batch_is_what_the_emulator_does() -> None:
-    """The same motion by command and by row; samples bear what the status says."""
+    """The same motion by command and by row; samples contain the values of the status."""
     table = Table(CONFIG, seed=3)
     snapshot = table.snapshot()
     table.receive(b"S 20\rA 50\rR -30\r")

@@ -1,4 +1,4 @@
-"""Stretches that pass at once, compiled or not, end in the states of a table that is watched tick by tick."""
+"""Ticks that pass at once, compiled or not, end in the states of a table that is observed tick by tick."""
 
 import sys
 
@@ -56,7 +56,7 @@ DEEDS = st.one_of(
 )
 
 
-def do(table: Table, deed: str, what: object) -> object:  # noqa: C901  # a case for each deed
+def do(table: Table, deed: str, what: object) -> object:  # noqa: C901  # a case for each action
     """Do one thing to a table, and return what can be seen of it."""
     match deed, what:
         case "receive", bytes(data):

@@ -41,7 +41,7 @@ NAMED = {
 
 @pytest.fixture(params=NAMED)
 def config(request: pytest.FixtureRequest, tmp_path: Path) -> TableConfig:
-    """A table that only the wider formats let in; its gains are no concern of these tests."""
+    """A table that only the wider formats allow; its gains do not matter in these tests."""
     path = tmp_path / "table.toml"
     path.write_text(NAMED[request.param], encoding="utf-8")
     return load_config(path).with_serial(baud=0)

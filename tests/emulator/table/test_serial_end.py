@@ -1,4 +1,4 @@
-"""The controller's end of the line, with a firmware that says every line back."""
+"""The controller's end of the line, with a firmware that returns every line."""
 
 import pytest
 

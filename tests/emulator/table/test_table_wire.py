@@ -1,4 +1,4 @@
-"""The table as its client knows it: each line and its reply."""
+"""The table seen by its client: each line and its reply."""
 
 import math
 from fractions import Fraction

@@ -15,7 +15,7 @@ def table_at_rest() -> tuple[TableConstants, TableState]:
 
 
 def table_in_motion() -> tuple[TableConstants, TableState]:
-    """Return a table that is told to turn by 100 counts, at 10 deg/s and 20 deg/s2."""
+    """Return a table that is commanded to turn by 100 counts, at 10 deg/s and 20 deg/s2."""
     constants, state = table_at_rest()
     profile = Profile.of(round(5.12 * COUNT), round(0.01024 * COUNT))
     bits = constants.firmware.motion_bits

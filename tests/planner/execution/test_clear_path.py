@@ -37,7 +37,7 @@ def test_the_start_is_reached_the_other_way_round_where_the_short_one_is_not_fre
 
 
 def free_by_small_steps(configuration_map: ConfigurationMap, from_deg: float, to_deg: float) -> bool:
-    """Tell whether each of many angles on the way is allowed at the first location."""
+    """Return whether each of many angles of the path is allowed at the first location."""
     count = 2 + round(abs(to_deg - from_deg) / 0.2)
     return all(configuration_map.is_allowed(0, float(angle)) for angle in np.linspace(from_deg, to_deg, count))
 

@@ -1,4 +1,4 @@
-"""The line dies in mid-run: how far an emulated table runs on, and what the report says of it."""
+"""The line fails during a run: how far an emulated table runs on, and what the report states about it."""
 
 from collections.abc import Callable
 
@@ -32,7 +32,7 @@ def ways_after_a_cut(
 ) -> tuple[Record, list[float]]:
     """Run a motion, and return how far the table goes on when the line is cut at every so many readings.
 
-    Each way is that of a copy of the table which hears nothing any more, until it stands.
+    Each distance is that of a copy of the table that receives nothing any more, until it stands.
     """
     port = FaultyPort()
     snapshots: list[Snapshot] = []

@@ -37,7 +37,7 @@ def errors_of(motion: TableMotion, commands: tuple[TimedCommand, ...], times_s: 
     seed=st.integers(0, 10_000),
     step_s=st.sampled_from([0.06, 0.1, 0.25, 0.5, 1.0]),
     decimals=st.integers(1, 3),
-    # Limits that the wire can say: a plan at a speed of 1.75 cannot be followed with one decimal.
+    # Limits that can be transmitted: a plan at a speed of 1.75 cannot be followed with one decimal.
     limits=st.builds(Limits, st.integers(5, 400).map(lambda n: n / 10), st.integers(10, 1000).map(lambda n: n / 10)),
 )
 @settings(max_examples=20, deadline=None)

@@ -66,7 +66,9 @@ def test_body_cavity_body_cavity_are_told_apart_whichever_way_each_body_is_writt
     mesh = together(*shells)
     mesh.vertices = mesh.vertices @ turn.T
     faces = np.array(mesh.faces)
-    per_box = {triangle // 12: triangle for triangle in flipped}  # at most one a box: most of it still tells
+    per_box = {
+        triangle // 12: triangle for triangle in flipped
+    }  # at most one per box: the rest still determines the orientation
     faces[list(per_box.values())] = faces[list(per_box.values()), ::-1]
     mended = outward(trimesh.Trimesh(mesh.vertices, faces[list(order)], process=False))
     assert np.rint(windings(mended, in_walls(turn).tolist())).tolist() == [1, 0, 1, 0]

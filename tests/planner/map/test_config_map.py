@@ -44,7 +44,7 @@ def test_a_point_is_allowed_only_if_every_sample_with_a_weight_is(seed: int, loc
         for k in {math.floor(location), math.ceil(location)}
         for i in {math.floor(position), math.ceil(position)}
     ]
-    # Within the tolerance of a sample, its neighbors have no say.
+    # Within the tolerance of a sample, its neighbors have no weight.
     if min(abs(x - round(x)) for x in (location, position)) > 1e-8:
         assert configuration_map.is_allowed(location, angle_deg) == all(corners)
 

@@ -1,4 +1,4 @@
-"""Algorithm 2 and `evalpath` as they are to be read; each test says what the printed reading would do instead."""
+"""Algorithm 2 and `evalpath` as they must be read; each test describes the effect of the printed version."""
 
 import itertools
 

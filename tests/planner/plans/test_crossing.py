@@ -17,7 +17,7 @@ def test_the_exact_check_agrees_with_very_many_sub_steps(
     generator = np.random.default_rng(seed)
     configuration_map = ConfigurationMap(np.where(generator.random((2, 24)) < 0.12, 0.0, 0.5))
     samples = np.array(swept_angles(angle, speed, acceleration, STEP_S)) / configuration_map.angle_step_deg
-    # A way that ends within a hair of a sample may be told apart by the exact check alone.
+    # Only the exact check may decide about a motion that ends very close to a sample.
     assume(np.abs(samples - np.round(samples)).min() > 1e-3)
     t = np.linspace(0.0, 1.0, 1500)[1:-1] * STEP_S
     way = angle + speed * t + 0.5 * acceleration * t**2

@@ -25,7 +25,7 @@ def robot_of(times_s: list[float]) -> list[RobotLatch]:
 
 
 def table_of(edges_s: list[float], reads_s: list[float]) -> list[TableReading]:
-    """Return what a table says that latches at some times and is read at others."""
+    """Return the replies of a table that latches at some times and is read at others."""
     readings = []
     for read_s in reads_s:
         latched = [edge for edge in edges_s if edge <= read_s]

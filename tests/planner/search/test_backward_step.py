@@ -20,7 +20,7 @@ TURNING = Problem(PROBLEM.map, step_s=12.0, limits=Limits(40.0, 5.0))
 def written_out(
     problem: Problem, grid: Grid, later: FloatArray, node_cost: FloatArray, sweep: npt.NDArray[np.int32]
 ) -> FloatArray:
-    """Return the least cost of leaving each state of a column."""
+    """Return the minimum cost of leaving each state of a column."""
     steps = lay_out_transitions(problem.terms, grid, 1.0)
     earlier = np.full(later.shape, np.inf)
     for (i, m), _ in np.ndenumerate(later):

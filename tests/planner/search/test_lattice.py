@@ -1,4 +1,4 @@
-"""What the rows of a step say, against the crossing rule asked for each step on its own."""
+"""The rows of a step, compared with the crossing rule for each single step."""
 
 import numpy as np
 import pytest

@@ -63,7 +63,7 @@ def new_tracker(view: int = 8, step_s: float | None = None, arm: Arm | None = No
 
 
 def begun_tracker(T_WS: FloatArray, view: int = 8, arm: Arm | None = None) -> Tracker:
-    """Return a tracker that rests at the start and knows its first view."""
+    """Return a tracker that rests at the start and has its first view."""
     tracker = new_tracker(view, arm=arm)
     for T in T_WS[: tracker.room]:
         tracker.reveal(T)

@@ -1,6 +1,6 @@
-"""A right table of another make: written from docs/protocol.md alone, in closed form, with nothing of the emulator's.
+"""A conforming third-party table: written from docs/protocol.md alone, in closed form, without code of the emulator.
 
-Its motor follows the reference at once; its encoder is coarse; how fast it answers and talks is for each test to say.
+Its motor follows the reference at once; its encoder is coarse. Each test sets the speed of its replies.
 """
 
 import math
@@ -29,7 +29,7 @@ class Make:
     latency_s: float = 0.08
     """From the CR of a command to the first byte of its reply."""
     profile_latency_s: float | None = None
-    """What the profile says of it, where that is not the truth."""
+    """The values of the profile, if they differ from the true ones."""
     acts_after: float = 0.5
     """The share of the latency after which the command is carried out."""
     reply_end: bytes = b"\r"

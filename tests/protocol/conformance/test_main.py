@@ -332,7 +332,7 @@ def test_a_record_that_hides_a_motion_is_refused_before_anything_is_sent(
 def test_a_replay_ends_when_a_table_has_carried_out_what_it_must_refuse(
     record: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A table that knows small letters is moved by a line that fits, and the next case would begin elsewhere."""
+    """A table that accepts lowercase letters is moved by a line that fits, and the next case would start elsewhere."""
     changed = json.loads(record.read_text())
     names = [case["id"] for case in changed["cases"] if case["wire"]][:2]
     changed["cases"] = [

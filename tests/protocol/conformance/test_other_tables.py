@@ -1,4 +1,4 @@
-"""Tables of another make: the kit passes what is right, however unusual it is, and says what it cannot test."""
+"""Third-party tables: the kit passes unusual but conforming ones, and states what it cannot test."""
 
 import dataclasses
 from pathlib import Path

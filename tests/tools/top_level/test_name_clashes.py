@@ -1,4 +1,4 @@
-"""Projects whose own packages are named as ours: they run their tests, and the fixture says what it cannot do."""
+"""Projects with packages of the same names: they run their tests, and the fixture states what it cannot do."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Lines and silence on the wire, from tables that take their time and from what is no table."""
+"""Lines and silence on the wire, from slow tables and from devices that are not a table."""
 
 from collections.abc import Iterator
 from itertools import cycle

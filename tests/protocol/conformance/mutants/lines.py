@@ -65,7 +65,7 @@ class AnswersEmptyLines(Mutant):
 
 @caught_by("3.1/5")
 class KeepsHalfLines(Mutant):
-    """the half line of a client that left meets the next one"""
+    """the incomplete line of a client that left is joined to the next one"""
 
     def disconnect(self) -> None:
         self._serial.uart.disconnect()
@@ -81,7 +81,7 @@ class CutsLongLines(Mutant):
 
 @caught_by("3.2/2")
 class CountsInAByte(Mutant):
-    """the length of a line is a byte, and begins anew after 255"""
+    """the length of a line is a byte, and starts again after 255"""
 
     def receive(self, data: bytes) -> None:
         super().receive(re.sub(rb"([^\r])[^\r]{256}\r", rb"\1\r", data))
@@ -200,7 +200,7 @@ class LengthBeforeBytes(Mutant):
 
 @caught_by("3.2/5")
 class LongLinesDrag(Mutant):
-    """a line too long spoils the next one"""
+    """a line that is too long makes the next one invalid"""
 
     spoiled = False
 
@@ -231,7 +231,7 @@ for each_s in (0.1, 1.0, 5.0):
 
 @caught_by("3.1/4")
 class SilenceEndsALine(Mutant):
-    """a half line is carried out after 2 s of silence"""
+    """an incomplete line is executed after 2 s of silence"""
 
     last_tick, is_half = 0, False
 

@@ -98,7 +98,7 @@ class RereadsNumbers(Mutant):
 
 
 class Rereads(Mutant):
-    """Carries a motion command out as another one, or says `OK` and passes it over."""
+    """Executes a motion command as another one, or sends `OK` and ignores it."""
 
     def instead(self, command: Command) -> Command | None:
         raise NotImplementedError

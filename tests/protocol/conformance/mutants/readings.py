@@ -1,4 +1,4 @@
-"""Wrong tables: what `H` and `L` say, and in which form."""
+"""Wrong tables: the replies to `H` and `L`, and their form."""
 
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
 
@@ -8,7 +8,7 @@ from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by, v
 
 @caught_by("4.2/1")
 class TellsTheTarget(Mutant):
-    """H tells where the table is going to"""
+    """H returns the target of the motion"""
 
     def _reply(self, command: Line) -> bytes:
         if verb_of(command) is Verb.READ_POSITION:
@@ -32,7 +32,7 @@ class StalePosition(Mutant):
 
 @caught_by("4.2/3")
 class Modulo360(Mutant):
-    """the position is told modulo 360"""
+    """the position is returned modulo 360"""
 
     def _reply(self, command: Line) -> bytes:
         if verb_of(command) is Verb.READ_POSITION:
@@ -81,7 +81,7 @@ class LatchIsThePosition(Mutant):
 
 @caught_by("5.2/1")
 class LatchInCounts(Mutant):
-    """L tells the latch in counts"""
+    """L returns the latch in counts"""
 
     def _reply(self, command: Line) -> bytes:
         if verb_of(command) is Verb.READ_LATCH:
@@ -90,7 +90,7 @@ class LatchInCounts(Mutant):
 
 
 class Renders(Mutant):
-    """Tells angles in another form."""
+    """Returns angles in another form."""
 
     def form(self, angle: Decimal) -> str:
         raise NotImplementedError

@@ -14,7 +14,7 @@ class AlmostEnoughBuffer(Mutant):
 
 @caught_by("8.3/1")
 class CancelIsIgnored(Mutant):
-    """CAN is passed over, and the half line carried out"""
+    """CAN is ignored, and the incomplete line is executed"""
 
     def receive(self, data: bytes) -> None:
         super().receive(data.replace(b"\x18", b""))

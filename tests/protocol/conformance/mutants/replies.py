@@ -84,7 +84,7 @@ for each in ErrorCode:
 
 @caught_by("5.4/1")
 class AnswersBadLines(Mutant):
-    """in strict mode a line that is no line at all is still answered"""
+    """in strict mode an invalid line is still answered"""
 
     def _reply(self, command: Line) -> bytes:
         return encode_reply(Refusal(command)) if isinstance(command, ErrorCode) else super()._reply(command)

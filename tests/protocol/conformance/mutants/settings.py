@@ -88,7 +88,7 @@ class ResetsForANewClient(Mutant):
 
 
 class WakesOtherwise(Mutant):
-    """Wakes with half of what a setting should be."""
+    """Starts with half of the value of a setting."""
 
     halved = ""
 
@@ -152,7 +152,7 @@ class CutsToItsLimit(Mutant):
 
 
 class LostInMotion(Mutant):
-    """Says `OK` to a setting that comes in a motion, and keeps the old one."""
+    """Sends `OK` to a setting during a motion, and keeps the old one."""
 
     verb = Verb.SET_SPEED
 

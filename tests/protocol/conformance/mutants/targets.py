@@ -60,7 +60,7 @@ class IncrementFromTheOldTarget(Rereads):
 
 @caught_by("4.5/2")
 class IncrementFromTheDisplay(Rereads):
-    """R counts from the position as it is told"""
+    """R counts from the reported position"""
 
     def instead(self, command: Command) -> Command:
         if command.verb is Verb.MOVE_TO:
@@ -86,7 +86,7 @@ class TakesNothingForALittle(Rereads):
 
 
 class PassesOverFarOnes(Rereads):
-    """Says `OK` to what leads out of the counter, and does nothing."""
+    """Sends `OK` to a target beyond the counter, and does nothing."""
 
     verb = Verb.MOVE_TO
 

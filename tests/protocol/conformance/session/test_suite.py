@@ -251,7 +251,7 @@ def test_on_a_real_table_a_failing_walk_is_not_repeated_but_shrunk_on_the_emulat
 
 
 def first_failure(rigs: Sequence[Rig]) -> str:
-    """Walk on one rig after the other until a walk fails, and return what it says."""
+    """Walk on one rig after the other until a walk fails, and return its message."""
     for rig in rigs:
         try:
             walk(rig)
@@ -261,7 +261,7 @@ def first_failure(rigs: Sequence[Rig]) -> str:
 
 
 class UnclockedPort:
-    """A port to a simulated table that does not say so."""
+    """A port to a simulated table without a clock of its own."""
 
     clock = None
 
