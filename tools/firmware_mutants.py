@@ -22,7 +22,7 @@ from protocol.conformance.cases.catalog import chosen_cases
 from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import Profile, load_profile
 from protocol.conformance.session.suite import Session, SessionError
-from tools.command_line import ended
+from protocol.ending import ended
 from tools.lockstep import PartingError, run_edges, run_lockstep, run_phases
 
 MUTANTS = Path(__file__).with_name("firmware_mutants.toml")

@@ -33,7 +33,7 @@ class ScanPath:
 
     def __post_init__(self) -> None:
         if len(self.T_WS) < 2:
-            raise PathError(f"the path has {len(self.T_WS)} location(s); it must have at least 2")
+            raise PathError(f"the number of locations of the path is {len(self.T_WS)}; it must be at least 2")
         if not 0.0 < self.step_s < np.inf:
             raise PathError(f"the path's time step is {self.step_s:g} s; it must be above 0")
         fault = first_not_rigid(self.T_WS)

@@ -78,8 +78,8 @@ def build_maps(
     shape = (len(configurations), n_locations, n_angles)
     if math.prod(shape) > _MOST_CELLS:
         raise ConfigurationMapError(
-            f"{len(configurations)} map(s) of {n_locations:,} locations and {n_angles:,} angles have"
-            f" {math.prod(shape):,} cells; at most {_MOST_CELLS:,} are allowed; use fewer angles, a longer time step,"
+            f"the maps of {n_locations:,} locations and {n_angles:,} angles in {len(configurations)} of 8 configurations"
+            f" have {math.prod(shape):,} cells; at most {_MOST_CELLS:,} are allowed; use fewer angles, a longer time step,"
             " or one configuration"
         )
     values, reasons = np.empty(shape), np.empty(shape, dtype=np.uint8)

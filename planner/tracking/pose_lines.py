@@ -66,7 +66,7 @@ class PoseLines:
             self._take(line)
         if not self.has_ended:
             raise SourceError(
-                f'{self._name}: ended after {self._count} location(s) without the line "end"; send it after the last'
+                f'{self._name}: ended without the line "end", at {self._count} locations; send it after the last'
             )
 
     def _take(self, line: bytes) -> None:

@@ -268,7 +268,7 @@ class Tracker(FollowedReference):
             TrackError: there is none.
         """
         if self.count < 2:
-            raise TrackError(f"the path has {self.count} location(s); it must have at least 2")
+            raise TrackError(f"the number of locations of the path is {self.count}; it must be at least 2")
         values, reasons = self._every.rate(np.stack([each.goal for each in self._known]), 0)
         starts = [self._start_in(c, values[c], reasons[c]) for c in range(len(values))]
         possible = [start for start in starts if start is not None]

@@ -85,7 +85,7 @@ def test_a_program_that_dies_leaves_the_table_at_rest_and_what_was_done_recorded
     out = tmp_path / "track"
     assert track(scan_file, out, "--poses", "-") == 2
     shown = capsys.readouterr()
-    assert 'stopped: stdin: ended after 15 location(s) without the line "end"' in shown.out
+    assert 'stopped: stdin: ended without the line "end", at 15 locations' in shown.out
     assert f"what was recorded until then is in {out}" in shown.err
     assert document_in(out, "plan.json")["table"]["speeds_deg_s"][-1] == 0.0
     assert document_in(out, "run.json")["forbidden_steps"] == []
@@ -116,8 +116,8 @@ def test_a_bad_location_on_the_way_is_named_in_one_line(
 @pytest.mark.parametrize(
     ("sent", "options", "message"),
     [
-        ([], (), 'stdin: ended after 0 location(s) without the line "end"'),
-        (['"end"'], (), "the path has 0 location(s); it must have at least 2"),
+        ([], (), 'stdin: ended without the line "end", at 0 locations'),
+        (['"end"'], (), "the number of locations of the path is 0; it must be at least 2"),
         (["[4000, 0, 0, 0, 0, 0]", "[4001, 0, 0, 0, 0, 0]", '"end"'], (), "location 0 has no table angle"),
         ([], ("--poses", "tcp://192.0.2.1:5000"), "allowed are - for stdin and tcp://127.0.0.1:PORT"),
         ([], ("--poses", "tcp://127.0.0.1:0", "--wait", "0.1"), "no program connected within 0.1 s"),

@@ -68,5 +68,5 @@ def test_a_line_without_end_is_refused_before_it_fills_the_memory() -> None:
 def test_a_stream_that_ends_without_its_marker_is_a_program_that_died() -> None:
     reader = PoseLines("poses")
     reader.feed(b"[1,2,3,4,5,6]\n")
-    with pytest.raises(SourceError, match=r'ended after 1 location\(s\) without the line "end"'):
+    with pytest.raises(SourceError, match=r'ended without the line "end", at 1 locations'):
         reader.close()
