@@ -78,9 +78,9 @@ def build_maps(
     shape = (len(configurations), n_locations, n_angles)
     if math.prod(shape) > _MOST_CELLS:
         raise ConfigurationMapError(
-            f"the maps of {n_locations:,} locations and {n_angles:,} angles in {len(configurations)} of 8 configurations"
-            f" have {math.prod(shape):,} cells; at most {_MOST_CELLS:,} are allowed; use fewer angles, a longer time step,"
-            " or one configuration"
+            f"the maps of {n_locations:,} locations and {n_angles:,} angles, for {len(configurations)} of 8"
+            f" configurations, have {math.prod(shape):,} cells; at most {_MOST_CELLS:,} are allowed; use fewer angles,"
+            " a longer time step, or one configuration"
         )
     values, reasons = np.empty(shape), np.empty(shape, dtype=np.uint8)
     cells = lay_out_cells(problem, configurations, n_angles)
