@@ -76,7 +76,7 @@ def compile_rest() -> None:
     """Build a distance field and a map, as small as they can be, and look for a proof that there is no plan."""
     build_field(trimesh.creation.box((100.0, 100.0, 100.0)), 50.0)
     problem = map_problem(load_scan("cylinder"))
-    build_maps(replace(problem, T_WS=problem.T_WS[:1]), [_ANY], 1)
+    build_maps(replace(problem, T_WS=problem.T_WS[:1]), [_ANY], 2)
     first_unreachable_location(_free_problem(load_scan("cylinder")), 1)
 
 
