@@ -89,7 +89,7 @@ class Choice(NamedTuple):
     command: MotionCommand
 
 
-def closest_command(before: Before, step: Step, grid: Grid, run_on_deg: float) -> Choice:
+def closest_command(before: Before, step: Step, grid: Grid, run_on_deg: float, enough_deg: float = 0.0) -> Choice:
     """Return the command that brings the reference nearest to the plan at the end of a step.
 
     Args:
@@ -97,6 +97,7 @@ def closest_command(before: Before, step: Step, grid: Grid, run_on_deg: float) -
         step: the goal.
         grid: the resolution of the numbers in the protocol.
         run_on_deg: maximum angle that the table may run on if the line fails.
+        enough_deg: the search ends at a command with at most this error; 0 searches all.
     """
     best, least = None, math.inf
     before = cache(before)  # most candidates have the same times
@@ -107,6 +108,8 @@ def closest_command(before: Before, step: Step, grid: Grid, run_on_deg: float) -
         error = _error_of(choice, before, step, least)
         if error < least:
             best, least = choice, error
+            if least <= enough_deg**2:
+                break
     assert best is not None
     return best
 
@@ -162,7 +165,8 @@ def _ramps(before: Before, step: Step, grid: Grid, run_on_deg: float) -> Iterato
     begin, unchanged = before(step.begin_s), before(step.end_s)
     missing_deg = step.end.angle_deg - unchanged.angle_deg
     unfinished = 2.0 * abs(missing_deg) / step.duration_s**2
-    for top in _speeds(unchanged.speed_deg_s, missing_deg, step, grid):
+    speeds = _speeds(unchanged.speed_deg_s, missing_deg, step, grid)
+    for top in sorted(speeds, key=lambda speed: abs(speed - step.end.speed_deg_s)):
         change = top - unchanged.speed_deg_s
         middle_s = step.end_s - (missing_deg / change if change else 0.5 * step.duration_s)
         fastest = max(abs(top), abs(begin.speed_deg_s), abs(unchanged.speed_deg_s))

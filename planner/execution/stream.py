@@ -66,7 +66,15 @@ def stream(motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float = 
 class Encoder:
     """The command of each piece of a motion, starting from the reference after the commands before it."""
 
-    def __init__(self, motion: MotionInTime, limits: Limits, wire: Wire, run_on_deg: float, spacing_s: float) -> None:
+    def __init__(
+        self,
+        motion: MotionInTime,
+        limits: Limits,
+        wire: Wire,
+        run_on_deg: float,
+        spacing_s: float,
+        enough_deg: float = 0.0,
+    ) -> None:
         """Encode a motion.
 
         Args:
@@ -75,8 +83,10 @@ class Encoder:
             wire: resolution of the numbers.
             run_on_deg: maximum angle that the table may run on if the line fails.
             spacing_s: minimum time from a command until the end of its piece.
+            enough_deg: an error at which the search for a command ends; see `closest_command`.
         """
-        self._motion, self._run_on_deg, self._spacing_s = motion, run_on_deg, spacing_s
+        self._motion, self._run_on_deg = motion, run_on_deg
+        self._spacing_s, self._enough_deg = spacing_s, enough_deg
         self._grid = Grid(limits, wire)
         self._most_rate = _AT_LIMIT * limits.acceleration_deg_s2
 
@@ -117,7 +127,7 @@ class Encoder:
         stands = max(abs(piece.start.speed_deg_s), abs(end.speed_deg_s)) <= STANDING_DEG_S
         planned = max(abs(leg.acceleration_deg_s2) for leg in (piece, self._motion.leg_at(end_s)))
         step = Step(begin_s, end_s, earliest_s, latest_s, middle, end, stands, planned > self._most_rate)
-        return closest_command(before, step, self._grid, self._run_on_deg)
+        return closest_command(before, step, self._grid, self._run_on_deg, self._enough_deg)
 
     def next_by_s(self, running: TimedCommand) -> float:
         """Return when the next command has to come at the latest, by plan: a step after this one it always may."""

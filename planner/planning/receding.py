@@ -81,9 +81,16 @@ def receding(problem: Problem, columns_in_view: int = 50, speed_count: int = SPE
     return make_plan(problem, RECEDING, angles, speeds, accelerations, pauses)
 
 
-def prepare_online_step(problem: Problem, speed_count: int = SPEED_COUNT) -> OnlineStep:
-    """Return the data for `online_step`, prepared once for a map's size, the limits and the weights."""
-    jump_count = 5 if speed_count <= FAST_SPEED_COUNT else 15
+def prepare_online_step(problem: Problem, speed_count: int = SPEED_COUNT, jump_count: int | None = None) -> OnlineStep:
+    """Return the data for `online_step`, prepared once for a map's size, the limits and the weights.
+
+    Args:
+        problem: the map's size, limits and weights.
+        speed_count: approximate number of speeds of the cost-to-go.
+        jump_count: number of changes of speed in a step; None: the default for the number of speeds.
+    """
+    if jump_count is None:
+        jump_count = 5 if speed_count <= FAST_SPEED_COUNT else 15
     grid = default_grid(problem, refinement=1, speed_count=speed_count, jump_count=jump_count, least_reach=2)
     unit = problem.greatest_step_cost
     backward = prepare_backward_step(problem.terms, grid, unit)

@@ -13,7 +13,6 @@ from planner.planning.receding import TRIALS, OnlineStep, costs_at_rest, look_ah
 from planner.plans.crossing import RunArray
 from planner.plans.problem import Terms
 from planner.search.cost_to_go import CostToGo
-from planner.table.motion import limited_acceleration
 from planner.tracking.rest_motion import NO_REST, rests_after
 from planner.tracking.revealed_map import Window
 
@@ -117,10 +116,9 @@ def safe_candidates(
     if window.last < 1:
         return
     terms = window.terms
+    most, least = (sign * terms.speed_limit_deg_s - speed_deg_s for sign in (1.0, -1.0))
     tried = method.accelerations_deg_s2(window, speed_deg_s)
-    accelerations = np.array(
-        [limited_acceleration(speed_deg_s, a, terms.step_s, terms.speed_limit_deg_s) for a in tried.tolist()]
-    )
+    accelerations = np.clip(tried, least / terms.step_s, most / terms.step_s)
     rests = rests_after(terms, window.last, angle_deg, speed_deg_s, accelerations, margin_deg)
     if (rests == NO_REST).all():
         return

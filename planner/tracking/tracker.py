@@ -38,6 +38,8 @@ DECISION_S = 0.01
 _READY_S = 0.005
 """A decision that begins later than so long before its lines is not taken."""
 _RESUME_COLUMNS = 10
+# A command that is so close to what was decided is as good as the closest one, and found sooner.
+_CLOSE_DEG = 0.02
 
 
 class TrackError(PlannerError):
@@ -188,6 +190,7 @@ class Tracker(FollowedReference):
             raise TrackError(f"the planner is {self._settings.planner}; allowed are {', '.join(METHODS)}")
         self._problem, self._step_s, self._limits, self._weights = problem, step_s, limits, weights
         self._angle_count = angle_count
+        self._times_of_lines: dict[float, tuple[float, float]] = {}
         self._check_the_step_fits()
         self._every = ColumnRater(problem, tuple(configurations), angle_count)
         self._rater = self._every
@@ -299,7 +302,12 @@ class Tracker(FollowedReference):
         self._planner.rehearse()
         self.motion = GrowingMotion(angle_deg, self._step_s, self._limits, self._settings.pause_times)
         self._encoder = Encoder(
-            self.motion, self._limits, self._wire, self._settings.run_on_deg, self._spacing_s(angle_deg)
+            self.motion,
+            self._limits,
+            self._wire,
+            self._settings.run_on_deg,
+            self._spacing_s(angle_deg),
+            _CLOSE_DEG,
         )
         return columns
 
@@ -419,13 +427,20 @@ class Tracker(FollowedReference):
     @property
     def _lines_s(self) -> float:
         """How long the lines of a command take, until its P takes effect."""
-        return exchanges_s(self._wire, self._any_command(self.motion.start_deg)) + self._wire.latency_s
-
-    def _any_command(self, angle_deg: float) -> MotionCommand:
-        return MotionCommand(-abs(angle_deg) - 1000.0, *self._limits)
+        return self._line_times(self.motion.start_deg)[0]
 
     def _spacing_s(self, angle_deg: float) -> float:
-        return spacing_s(angle_deg, self._limits, self._wire) + DECISION_S
+        """Return how long before the end of a step its command has to take effect at the latest."""
+        return self._line_times(angle_deg)[1]
+
+    def _line_times(self, angle_deg: float) -> tuple[float, float]:
+        """Return both, which depend on the digits of the angle alone."""
+        farthest_deg = 10.0 ** len(str(int(abs(angle_deg) + 1000.0))) - 1.0
+        if farthest_deg not in self._times_of_lines:
+            lines_s = exchanges_s(self._wire, MotionCommand(-farthest_deg, *self._limits)) + self._wire.latency_s
+            between_s = spacing_s(farthest_deg - 1000.0, self._limits, self._wire) + DECISION_S
+            self._times_of_lines[farthest_deg] = lines_s, between_s
+        return self._times_of_lines[farthest_deg]
 
     def _check_the_step_fits(self) -> None:
         needed_s = self._spacing_s(0.0)

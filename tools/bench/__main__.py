@@ -12,7 +12,7 @@ from importlib import import_module
 from protocol.command_line import Parser, program_name
 from protocol.ending import ended
 
-SUBJECTS = ("calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream")
+SUBJECTS = ("calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream", "track")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -28,6 +28,8 @@ def _run(options: argparse.Namespace, benches: Mapping[str, Callable[..., None]]
     for subject, bench in benches.items():
         if subject == "identify":
             bench(sys.stdout, options.plants, options.seed, options.jobs, options.pty, options.wide)
+        elif subject == "track":
+            bench(sys.stdout, options.pty)
         else:
             bench(sys.stdout)
     return 0
@@ -42,7 +44,9 @@ def _parser() -> Parser:
     )
     parser.add_argument("subject", choices=SUBJECTS, nargs="+")
     identify = parser.add_argument_group("for identify")
-    identify.add_argument("--pty", action="store_true", help="in real time: takes minutes, on a quiet machine")
+    parser.add_argument(
+        "--pty", action="store_true", help="for identify and track: in real time, minutes on a quiet machine"
+    )
     identify.add_argument(
         "--wide", action="store_true", help="a wider family of tables, and the default table with seeds 0 to 19"
     )
