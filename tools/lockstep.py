@@ -219,9 +219,9 @@ def random_line(chance: Random, config: TableConfig) -> bytes:
 
 
 def run_edges(config: TableConfig, ticks: int, edges_s: int = MOST_EDGES_S, firmware: Path | None = None) -> Chip:
-    """Turn the shaft at a constant speed in both directions, at any cycle of a tick, and return the controller.
+    """Turn the shaft at a constant speed both ways, and return the controller, which moves, brakes and answers lines.
 
-    Meanwhile the controller brakes and the line is busy.
+    The edges come at any cycle of a tick, also while it is sampled.
 
     Raises:
         PartingError: its count is not that of the edges.

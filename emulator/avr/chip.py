@@ -10,6 +10,7 @@ from emulator.avr.errors import ChipError, ToolchainError
 from emulator.avr.toolchain import build_simulator
 
 _MOST_SENT = 256
+_RAM_END = 0x900
 _FAILURES = {
     -1: "its tick did not come",
     -2: "its program crashed",
@@ -135,6 +136,12 @@ class Chip:
     def is_sending(self) -> bool:
         """Whether a byte is on its way out."""
         return bool(self._shown.line_count)
+
+    @property
+    def stack_bytes(self) -> int:
+        """The deepest that the stack has been: memory that was never used is 0."""
+        size = _RAM_END - (self._program.symbols["_end"] - DATA_SPACE)
+        return len(self.memory("_end", size).lstrip(b"\0"))
 
     def take_sent(self) -> bytes:
         """Return and remove the bytes whose stop bit has been sent."""
