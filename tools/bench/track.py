@@ -24,9 +24,9 @@ from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.own_planners import planner_named
-from planner.planning.plan import Pause, Plan, path_cost
-from planner.planning.problem import Problem
 from planner.planning.scan_problem import scan_problem
+from planner.plans.plan import Pause, Plan, path_cost
+from planner.plans.problem import Problem
 from planner.table.motion import Limits
 from planner.table.wire import Wire
 from planner.tracking.decision import METHODS, costs_of_starts

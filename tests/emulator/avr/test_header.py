@@ -5,13 +5,13 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
+from emulator.config.toml_section import ConfigError
 from hypothesis import given
 from hypothesis import strategies as st
 
 from emulator.avr.header import CLOCK_HZ, digest_of, header_text, uart_of
 from emulator.avr.toolchain import CONSTANTS
 from emulator.config.table_config import TableConfig, load_config
-from emulator.config.toml_section import ConfigError
 
 DEFAULT = load_config()
 
@@ -43,7 +43,9 @@ def test_a_factor_to_a_register_is_an_exact_fraction_in_lowest_terms() -> None:
 @pytest.mark.parametrize(("limit", "text"), [(33.3, "33.3"), (1e-5, "0.00001"), (40.0, "40.0")])
 def test_a_limit_is_the_decimal_of_the_file(limit: float, text: str) -> None:
     config = replace(
-        DEFAULT, limits=replace(DEFAULT.limits, speed_deg_s=limit), power_on=replace(DEFAULT.power_on, speed_deg_s=limit)
+        DEFAULT,
+        limits=replace(DEFAULT.limits, speed_deg_s=limit),
+        power_on=replace(DEFAULT.power_on, speed_deg_s=limit),
     )
     assert macros(config)["SPEED_LIMIT"] == f'"{text}"'
 
@@ -77,7 +79,10 @@ def test_other_constants_have_another_digest() -> None:
         (replace(DEFAULT, control=replace(DEFAULT.control, speed_window_ticks=65)), "speed_window_ticks is 65"),
         (replace(DEFAULT, encoder=replace(DEFAULT.encoder, lines=500)), "edges of the encoder a second"),
         (replace(DEFAULT, gears=replace(DEFAULT.gears, ratio=480.12345)), "counts a degree"),
-        (replace(DEFAULT, gears=replace(DEFAULT.gears, ratio=1.0), encoder=replace(DEFAULT.encoder, lines=80)), "counts a"),
+        (
+            replace(DEFAULT, gears=replace(DEFAULT.gears, ratio=1.0), encoder=replace(DEFAULT.encoder, lines=80)),
+            "counts a",
+        ),
     ],
 )
 def test_a_table_that_the_controller_cannot_run_is_refused_by_key(config: TableConfig, words: str) -> None:
