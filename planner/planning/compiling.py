@@ -1,8 +1,9 @@
 """The machine code of a first plan, compiled in two processes.
 
-On a new machine, or after a change of kernels, a plan waits for them, and numba compiles one after the other in a
-process. So a second process compiles those of the distance field and of the map, and then those of the proof that there
-is no plan, while this one compiles the planner's. Who needs what the other still compiles waits (`made_by_one`).
+On a new machine, or after a change of kernels, a plan has to wait for its kernels, and numba compiles sequentially
+within a process. So a second process compiles the kernels of the distance field and of the map, and then those of the
+proof that there is no plan. Meanwhile this process compiles the planner's. A process that needs a kernel which the
+other one is compiling waits (`made_by_one`).
 """
 
 import subprocess
@@ -63,7 +64,10 @@ def compiling_beside(planner: str, progress: ProgressOf) -> Iterator[None]:
 
 
 def compile_default_planner() -> None:
-    """Plan once on a map without obstacles, and judge the plan as a command does: types are those of any other scan."""
+    """Plan once on a map without obstacles, and check the plan as a command does.
+
+    The types are those of any other scan.
+    """
     problem = _free_problem(load_scan("cylinder"))
     plan = dynamic_programming(problem)
     assert problem.arm is not None

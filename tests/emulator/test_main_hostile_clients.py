@@ -95,7 +95,7 @@ def test_random_bytes_by_the_megabyte_move_nothing(
     """Any bytes at any split: one reply a line, in order, and the motion that was running goes on untouched."""
     control = tmp_path / "control"
     table = start_emulator("--pty", "--baud", "0", "--time-scale", "0.01", "--control", str(control))
-    chance = random.Random(1)  # noqa: S311  # noise is no secret
+    chance = random.Random(1)  # noqa: S311  # not for security
     # Without the letters that could, by chance, be a command that is to be carried out.
     harmless = sorted(set(range(256)) - set(b"PRSA"))
     noise = bytes(chance.choices(harmless, k=1 << 20))

@@ -89,7 +89,7 @@ class Terms(NamedTuple):
 
 
 def tune(config: TableConfig, terms: Terms, progress: Callable[[float], None] = lambda _: None) -> Tuning:
-    """Return the gain sets that are best within the limits, or nearest to them, and how they do.
+    """Return the best gain sets within the limits, or the nearest ones, and their results.
 
     Raises:
         TuningError: no gains make both loops stable.

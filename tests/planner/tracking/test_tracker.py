@@ -184,7 +184,7 @@ def test_a_source_of_thousands_of_locations_needs_no_more_memory_than_one_of_a_h
     sizes = []
     for k in range(6, 600):
         if tracker.room and k % 50 > 10:
-            # To and fro along the path, with stalls.
+            # Back and forth along the path, with stalls.
             tracker.reveal(path[abs((k % 118) - 59)])
         asked(tracker)
         if k % 100 == 99:

@@ -51,7 +51,7 @@ class UnhurriedPort(LatePort):
 
     def __init__(self, port: Serial, seed: int) -> None:
         super().__init__(port)
-        self._chance = Random(seed)  # noqa: S311  # jitter is no secret
+        self._chance = Random(seed)  # noqa: S311  # not for security
 
     def write(self, data: bytes, /) -> int | None:
         self.dawdle()
