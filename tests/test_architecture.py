@@ -1,4 +1,4 @@
-"""The shape of the whole: imports run one way, and clocks, ports and threads stay at the edge."""
+"""The structure of the project: imports have one direction, and clocks, ports and threads stay at the edge."""
 
 import ast
 import re
@@ -142,7 +142,7 @@ def imported_packages(source: Path) -> Iterator[str]:
 
 
 def imports_from(packages: Iterable[str], sources: Iterable[Path]) -> list[tuple[str, str]]:
-    """Return which source imports what from any of some packages, which are given by their full names."""
+    """Return which source imports what from any of some packages, given by their full names."""
     beginnings = tuple(f"{package}." for package in packages)
     return [
         (str(source), name)
@@ -249,7 +249,7 @@ def test_the_emulator_touches_clock_ports_and_files_at_its_edge_only() -> None:
 
 
 TABLE_NAMES = ("table", "bench", "stand", "view", "simulated", "status", "snapshot", "start_emulator")
-"""What a table, its bench, or a look at it is called, alone or as the end of a name."""
+"""Names of a table, its bench, or its state, alone or as the end of a name."""
 
 
 def names_a_table(name: str) -> bool:

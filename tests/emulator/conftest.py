@@ -14,11 +14,11 @@ from tests.emulator.fault_bench import Bench
 from tests.emulator.quiet_stand import QuietStand
 
 PATIENCE_S = 20.0
-"""How long to wait for what should come at once: only a failing test ever does."""
+"""Timeout for what should come at once; only a failing test reaches it."""
 
 
 class EmulatorProcess:
-    """A running `python -m emulator`; it is ended, and must end well, when its test is over."""
+    """A running `python -m emulator`. It is ended after its test, and must end without an error."""
 
     def __init__(self, arguments: tuple[str, ...], stderr_path: Path) -> None:
         self._stderr_path = stderr_path
@@ -82,7 +82,7 @@ def warnings() -> list[str]:
 
 @pytest.fixture
 def opened() -> Iterator[Callable[[str], int]]:
-    """Open devices as any program would, and close what is still open afterwards."""
+    """Open devices as any program would, and close those that are still open afterwards."""
     descriptors: list[int] = []
 
     def open_device(name: str) -> int:
@@ -117,7 +117,7 @@ def folder() -> Iterator[Path]:
 
 @pytest.fixture
 def served(folder: Path, stand: QuietStand) -> Iterator[Path]:
-    """The path of a control channel that is served until the test is over."""
+    """The path of a control channel that is served until the end of the test."""
     control = ControlSocket(folder / "control")
     ended = threading.Event()
 

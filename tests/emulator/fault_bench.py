@@ -6,7 +6,7 @@ from protocol import TableClient
 
 
 class Bench:
-    """A table, its port, and a client that has found its place."""
+    """A table, its port, and a client that has resynchronized."""
 
     def __init__(self, url: str = "emulator://") -> None:
         self.port = Serial(url, timeout=1)

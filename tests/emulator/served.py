@@ -1,4 +1,4 @@
-"""What tests of the running emulator share: its start, and a client that waits for answers."""
+"""Common parts of tests of the running emulator: its start, and a client that waits for replies."""
 
 import subprocess
 from collections.abc import Callable

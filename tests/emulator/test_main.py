@@ -22,7 +22,7 @@ pytestmark = [
 
 
 def refusal(*arguments: str) -> str:
-    """Return the one line that a start which must fail leaves on stderr."""
+    """Return the one line on stderr of a start that must fail."""
     done = subprocess.run(
         [sys.executable, "-m", "emulator", *arguments], capture_output=True, text=True, timeout=20, check=False
     )
@@ -123,7 +123,7 @@ def test_at_rest_it_uses_nearly_no_time(start_emulator: Start) -> None:
 
     before_s = used_s()
     time.sleep(1.0)
-    # Well above what it takes (0.01) and well below what a loop that spins takes (1.0).
+    # Far above the normal value (0.01) and far below that of a busy loop (1.0).
     assert used_s() - before_s < 0.3
 
 
@@ -229,7 +229,7 @@ def test_help_shows_an_example() -> None:
 
 
 def stopped_for(table: EmulatorProcess, duration_s: float) -> float:
-    """Stop the process with SIGSTOP, let it go on, and return for how long it certainly stood, in seconds."""
+    """Stop the process with SIGSTOP, continue it, and return the minimum duration of the stop, in seconds."""
     state = Path(f"/proc/{table.process.pid}/stat")
     table.process.send_signal(signal.SIGSTOP)
     while state.read_text().rpartition(")")[2].split()[0] != "T":
@@ -254,10 +254,10 @@ def test_a_long_stop_of_the_process_is_left_out_at_rest_and_in_motion(
         before_s, before = time.monotonic(), control_client.request(control, "state")
         stood_s = stopped_for(table, 0.8)
         table.wait_for_words("simulated time falls behind")
-        time.sleep(0.1)  # in which a clock that is ahead would be caught up with
+        time.sleep(0.1)  # time to catch up if the clock were ahead
         after, after_s = control_client.request(control, "state"), time.monotonic()
     passed_s = (after["tick"] - before["tick"]) / 1000
-    assert passed_s <= after_s - before_s - stood_s + 0.001  # not even half a second is made up for
+    assert passed_s <= after_s - before_s - stood_s + 0.001  # not even half a second is caught up
     speed_deg_s = 2.0 if command == b"P 100" else 0.0
     assert after["reference_deg"] - before["reference_deg"] == pytest.approx(speed_deg_s * passed_s, abs=1e-3)
 

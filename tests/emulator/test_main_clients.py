@@ -1,4 +1,4 @@
-"""The emulator as its users meet it: a process, a port, and clients that nobody here wrote."""
+"""The emulator as its users see it: a process, a port, and third-party clients."""
 
 import shutil
 import subprocess
@@ -93,7 +93,7 @@ def test_socat_talks_to_the_table(start_emulator: Start, line_end: bytes) -> Non
 
 
 def test_the_shell_is_client_enough(start_emulator: Start, tmp_path: Path, wait_until: WaitUntil) -> None:
-    """It opens, writes and goes before the line has carried its bytes: they arrive all the same."""
+    """It opens, writes and closes before the line has transmitted its bytes: they arrive nevertheless."""
     control = tmp_path / "control"
     table = start_emulator("--pty", "--time-scale", "20", "--control", str(control))
     subprocess.run(["sh", "-c", f"{{ printf 'S 40\\r'; printf 'P 20\\r'; }} > {table.port}"], check=True)

@@ -1,4 +1,4 @@
-"""What clients that misbehave, or die, do not do to the emulator."""
+"""Clients that misbehave or fail do not affect the emulator."""
 
 import os
 import random
@@ -21,7 +21,7 @@ pytestmark = [
 
 
 def ask_after_reopening(port: serial.Serial) -> bytes:
-    """Return the reply to H, asked again where the table saw it together with the close of the port before."""
+    """Return the reply to H, sent again if the table received it together with the close of the port."""
     reply = ask(port, b"H")
     return ask(port, b"H") if reply == b"ERR 5 bad byte\r" else reply
 
@@ -35,7 +35,7 @@ def test_a_half_line_is_not_glued_to_the_next_clients_first(start_emulator: Star
     after = os.open(table.port, os.O_RDWR | os.O_NOCTTY)
     os.write(after, b"0\r")
     reply = b""
-    while not reply.endswith(b"\r"):  # what is on the wire when a client leaves may reach the next one
+    while not reply.endswith(b"\r"):  # bytes on the line when a client disconnects may reach the next one
         assert select.select([after], [], [], 10.0)[0]
         reply += os.read(after, 64)
     os.close(after)
@@ -53,7 +53,7 @@ HALVES = [
     (b"R", b" 90\r"),
     (b"P 9", b"0\r\r"),
 ]
-"""What one client leaves behind, and what would make a command of it."""
+"""Bytes that one client leaves, and bytes that would complete them to a command."""
 
 
 @pytest.mark.parametrize("baud", ["0", "9600"])
@@ -92,7 +92,7 @@ def test_a_client_may_come_and_go_many_times(start_emulator: Start) -> None:
 def test_random_bytes_by_the_megabyte_move_nothing(
     start_emulator: Start, tmp_path: Path, wait_until: WaitUntil
 ) -> None:
-    """Any bytes at any split: one reply a line, in order, and the motion that was running goes on untouched."""
+    """Any bytes at any split: one reply per line, in order, and the running motion continues unchanged."""
     control = tmp_path / "control"
     table = start_emulator("--pty", "--baud", "0", "--time-scale", "0.01", "--control", str(control))
     chance = random.Random(1)  # noqa: S311  # not for security

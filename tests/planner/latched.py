@@ -1,4 +1,4 @@
-"""Runs with latches, for tests: made up ones, and real ones on a table in simulated time."""
+"""Runs with latches, for tests: synthetic ones, and real ones on a table in simulated time."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ LIMITS = Limits(40.0, 100.0)
 
 
 def swinging_plan(seconds: float = 4.0, acceleration_deg_s2: float = 10.0) -> Plan:
-    """Return a plan that turns one way and back."""
+    """Return a plan that turns in one direction and back."""
     step_s = 0.5
     count = int(seconds / step_s)
     signs = np.array([1.0 if k < count // 4 else -1.0 if k < 3 * count // 4 else 1.0 for k in range(count)])
@@ -43,7 +43,7 @@ def table_behind(port: object) -> SimulatedBench:
 def latched_run(
     conditions: TriggerConditions, plan: Plan | None = None, decimals: int = 1, query: str = ""
 ) -> LatchedRun:
-    """Return what was latched along a plan on a table of its own."""
+    """Return the latched values along a plan on a new table."""
     plan, wire = plan or swinging_plan(), Wire(decimals)
     port = open_port(f"emulator://?decimals={decimals}{query}", wire.baud, 0.5)
     with TableClient(port, 0.5, decimals) as table:

@@ -1,4 +1,4 @@
-"""A scan that is soon over: a cylinder of 100 mm."""
+"""A short scan: a cylinder of 100 mm."""
 
 SMALL = """
 [cell]

@@ -1,4 +1,4 @@
-"""What `import planner` gives: little at first, and everything by name."""
+"""The content of `import planner`: little at first, and everything by name."""
 
 import subprocess
 import sys

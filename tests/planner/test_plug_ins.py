@@ -1,4 +1,4 @@
-"""Planners and value factors of other packages: found by name, checked, and harmless to others when they are broken."""
+"""Planners and value factors of other packages: found by name, checked, and without effect on others when broken."""
 
 import sys
 from collections.abc import Callable
@@ -106,7 +106,7 @@ BROKEN = {
 
 
 def install(folder: Path, package: str, groups: dict[str, dict[str, str]]) -> None:
-    """Make a package of that name known, as an installer does."""
+    """Make a package with that name known, like an installer."""
     metadata = folder / f"{package.replace('-', '_')}-1.0.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Arms whose joints are simple functions of location and table angle, and the slow, obvious check of their turns."""
+"""Arms whose joints are simple functions of location and table angle, and a slow, obvious check of their turns."""
 
 import math
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ def winding_arm(
     turns_4: int = 0,
     zero_deg: float = 0.0,
 ) -> ArmOnPath:
-    """Return an arm whose joint 6 follows the table and turns by `twist_deg` a location; joint 4 sways or winds too.
+    """Return an arm whose joint 6 follows the table and turns by `twist_deg` per location; joint 4 moves too.
 
     Joint 6 is at 0 where table angle and twist add up to `zero_deg`.
     """

@@ -1,4 +1,4 @@
-"""The client's verbs, what it refuses, stopping and arrival, against a table in virtual time."""
+"""The client's verbs, its errors, stopping and arrival, with a table in virtual time."""
 
 from collections.abc import Callable
 from decimal import Decimal
@@ -94,7 +94,7 @@ def test_stop_is_sent_at_once_even_when_replies_are_missing() -> None:
 
 
 def stopped_at(write: Callable[[bytes], int], port: TablePort, begun_s: float) -> Callable[[bytes], int]:
-    """Return a write that ends the test once `R` was sent, without any time having passed."""
+    """Return a write that ends the test after `R` was sent, without any elapsed time."""
 
     def spy(data: bytes) -> int:
         write(data)

@@ -1,4 +1,4 @@
-"""The bench of an emulator in another process: against the emulator's server, and against other listeners."""
+"""The bench of an emulator in another process: with the emulator's server, and with other listeners."""
 
 import json
 import socket

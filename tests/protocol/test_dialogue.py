@@ -179,7 +179,7 @@ def say_and_check(client: TableClient, port: TablePort, what: str) -> None:
 
 
 class StarvedClock(VirtualClock):
-    """The clock of a program that gets the processor back two seconds after each look at it."""
+    """The clock of a program that continues two seconds after each look at it."""
 
     def now_s(self) -> float:
         self.time_s += 2.0

@@ -1,4 +1,4 @@
-"""A file is used only where it is whole, keeps its name and is this user's own; what cannot be kept costs time only."""
+"""A file is used only if it is complete, has its name and belongs to this user; otherwise only time is lost."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""Programs that move a table, ended by a signal on a real pty; and programs that are interrupted as they start."""
+"""Programs that move a table, ended by a signal on a real pty; and programs interrupted during their start."""
 
 import re
 import signal
@@ -19,7 +19,7 @@ from tests.planner.small_scan import SMALL
 OURS = re.compile(rf"{re.escape(str(Path(__file__).parents[2]))}/(emulator|planner|protocol|tools)/")
 """A file of this project in a traceback."""
 SLOWLY = 0.3
-"""The time scale of the emulator under a scan that would soon be over."""
+"""The time scale of the emulator for a scan that would otherwise end too early."""
 STANDS = re.compile(r"the table was stopped and stands at (-?[0-9.]+) deg")
 
 

@@ -34,7 +34,7 @@ def shot() -> Plan:
 
 
 def ways_at(moment: int) -> set[str]:
-    """Return on which sides of the second obstacle the rays from the plan's state at a moment get past both."""
+    """Return on which sides of the second obstacle the rays from the plan's state at a time pass both obstacles."""
     rays = complete_rays(obstacle_problem(), shot(), moment)
     at_obstacle = [ray[min(SECOND_OBSTACLE_LOCATION - moment, len(ray) - 1)] for ray in rays]
     return {"left" if angle < SECOND_OBSTACLE_DEG[0] else "between" for angle in at_obstacle}

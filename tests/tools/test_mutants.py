@@ -1,4 +1,4 @@
-"""The search for wrong tables that the suite passes, in small; the full one is `python -m tools.mutants`."""
+"""A small search for wrong tables that the suite passes; the full one is `python -m tools.mutants`."""
 
 import ast
 import inspect

@@ -1,4 +1,4 @@
-"""Mutation testing in small: what it draws, which tests it runs, and that it sees a fault and its absence."""
+"""Mutation testing at a small size: drawn mutants, selected tests, and the detection of a fault."""
 
 import shutil
 from pathlib import Path

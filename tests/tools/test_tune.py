@@ -34,7 +34,7 @@ def test_the_command_line_writes_gains_header_report_and_plots(
     load_config(tmp_path / "out" / "gains.toml")
     report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert report.count("<svg") == 4
-    assert "src=" not in report  # nothing is fetched from elsewhere
+    assert "src=" not in report  # nothing is loaded from elsewhere
 
 
 def judged(gains: str, folder: Path, *options: str) -> tuple[int, dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""The configuration: every default is there, and what cannot be used is refused by file, key and what is allowed."""
+"""The configuration: every default exists, and errors name the file, the key and the allowed values."""
 
 import math
 import tomllib

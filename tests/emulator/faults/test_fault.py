@@ -1,4 +1,4 @@
-"""The catalog: what is a fault, by the same names and numbers everywhere."""
+"""The catalog of faults, with the same names and numbers everywhere."""
 
 import json
 import math
@@ -90,7 +90,7 @@ def test_what_is_no_fault_is_refused_in_one_line(
 
 
 class Seen(NamedTuple):
-    """What a client and the state of the table show of a short session."""
+    """The observations of a client and of the table's state in a short session."""
 
     hung_up: bool
     replies: list[bytes]
@@ -120,7 +120,7 @@ def test_every_fault_has_an_effect(kind: str) -> None:
 
 
 class Gremlins(Fault, kind="gremlins"):
-    """Nothing goes wrong."""
+    """No fault."""
 
 
 def test_a_fault_without_effect_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""What a fault of the line does shows at the wire, and the client does about it what it should."""
+"""The effect of a fault of the line on the wire, and the reaction of the client."""
 
 import subprocess
 import sys

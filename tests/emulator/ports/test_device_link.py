@@ -82,7 +82,7 @@ def test_the_link_of_a_living_emulator_is_left_to_it_and_that_of_a_dead_one_is_t
     with pytest.raises(FileExistsError, match="another emulator"):
         DeviceLink(path, DEVICE)
     assert path.readlink() == Path(name)
-    DeviceLink(path, name)  # its own, that one left behind which had the same device before
+    DeviceLink(path, name)  # its own link; the old one with the same device remained
     os.close(device)
     os.close(server)
     second = DeviceLink(path, DEVICE)

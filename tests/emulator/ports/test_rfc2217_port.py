@@ -23,7 +23,7 @@ ANY_BYTES = bytes(range(256))
 
 
 class Served:
-    """A port that is looked at until the test is over, as the server does."""
+    """A port that is polled until the end of the test, as by the server."""
 
     def __init__(self, port: Rfc2217Port) -> None:
         self.port = port

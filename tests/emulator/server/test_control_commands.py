@@ -76,7 +76,7 @@ VALUES = st.recursive(SCALARS, lambda inner: st.lists(inner) | st.dictionaries(s
 
 @st.composite
 def requests(draw: st.DrawFn) -> bytes:
-    """Draw a request whose name and parameters are mostly known, with any value in each place."""
+    """Draw a request with mostly known name and parameters, and any values."""
     name = draw(st.sampled_from(sorted(COMMANDS)) | st.text())
     known = [parameter.name for parameter in COMMANDS[name].parameters] if name in COMMANDS else NAMES
     fields: dict[str, Any] = {"command": name}

@@ -1,4 +1,4 @@
-"""The control channel's socket, and clients that come in pieces, in crowds and not at all."""
+"""The socket of the control channel, and clients that send in pieces, in large numbers or not at all."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""A path whose beam does not meet the part is named, with where."""
+"""A path whose beam does not meet the part is reported, with the locations."""
 
 from pathlib import Path
 

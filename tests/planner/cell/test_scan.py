@@ -16,7 +16,7 @@ SCANS = Path(__file__).parents[3] / "planner" / "scans"
 
 
 def changed(folder: Path, name: str, old: str, new: str) -> Path:
-    """Return a copy of a shipped scan in which one text is replaced."""
+    """Return a copy of a shipped scan with one text replaced."""
     text = (SCANS / f"{name}.toml").read_text()
     assert old in text
     file = folder / "scan.toml"

@@ -1,4 +1,4 @@
-"""From a mesh that somebody brings to a verified plan: `new-scan`, `plan`, `run`."""
+"""From a new mesh to a verified plan: `new-scan`, `plan`, `run`."""
 
 import re
 from dataclasses import replace
@@ -24,7 +24,7 @@ FOREIGN = {"angle_block": ("--unit", "inch"), "plate_holes": ()}
 
 
 def new_scan(mesh: Path, *options: str) -> Path | None:
-    """Return the scan file that `new-scan` writes for a mesh, beside it."""
+    """Return the scan file that `new-scan` writes for a mesh, in the same folder."""
     scan = mesh.with_suffix(".toml")
     return scan if main(["new-scan", str(mesh), *options, "--out", str(scan)]) == 0 else None
 

@@ -1,4 +1,4 @@
-"""What `run` refuses before anything moves, through the command line, on an emulator that is asked where it is."""
+"""Plans that `run` refuses before anything moves, from the command line, on an emulator whose position is read."""
 
 import json
 import subprocess
@@ -35,7 +35,7 @@ def start_emulator(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[s
 
 
 def state_of(control: Path) -> tuple[float, float, float]:
-    """Return where the table is, by its own state."""
+    """Return the true position of the table."""
     status = ControlChannel(control).status()
     return status.reference_deg, status.encoder_deg, status.true_deg
 
@@ -59,7 +59,7 @@ def moved(joint: int, by_deg: float, first: int = 0, last: int = LOCATIONS) -> C
 
 
 def flip_the_wrist(document: Document) -> None:
-    """Hold the same poses in another configuration than the plan's."""
+    """Put the same poses into another configuration than the plan's."""
     joints, _ = inverse_kinematics(CELL.arm, CELL.arm.flange_poses(np.radians(JOINTS_DEG)))
     document["joints_deg"] = np.degrees(np.unwrap(joints[:, Configuration.LEFTY_ABOVE_FLIP], axis=0)).tolist()
 

@@ -1,4 +1,4 @@
-"""`track` from the command line: on the scan's path and on a program's, in virtual time and on a real pty."""
+"""`track` from the command line: for the scan's path and a program's, in virtual time and on a real pty."""
 
 import json
 import socket

@@ -1,4 +1,4 @@
-"""Execution in virtual time: on a sound table, and on tables and lines that go wrong in mid-run."""
+"""Execution in virtual time: on a healthy table, and on tables and lines that fail during the run."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +24,7 @@ Progress = Callable[[int, int], None]
 
 
 def motion_at(speed_deg_s: float, duration_s: float) -> TableMotion:
-    """Return a motion that speeds up for a second and goes on."""
+    """Return a motion that accelerates for a second and continues."""
     steps = round(duration_s / 0.1)
     accelerations = np.zeros(steps)
     accelerations[:10] = speed_deg_s
@@ -193,7 +193,7 @@ def test_a_lead_makes_the_reference_early_by_that_time(lead_s: float) -> None:
     assert record.failure is None
     steady = [each for each in record.observations if each.source == "inside" and 1.0 < each.time_s < 2.5]
     planned_deg = [motion_at(20.0, 3.0).state_at(each.time_s).angle_deg for each in steady]
-    # At a constant 20 deg/s an angle ahead is a time ahead.
+    # At a constant 20 deg/s, an angle ahead corresponds to a time ahead.
     reference_deg = np.array([each.reference_deg for each in steady], dtype=np.float64)
     ahead_s = np.mean(reference_deg - planned_deg) / 20.0
     behind_s = np.mean(reference_deg - [each.encoder_deg for each in steady]) / 20.0

@@ -1,4 +1,4 @@
-"""Plan files that must not be run: each is refused with one sentence that names the file."""
+"""Plan files that must not be executed: each is refused with one sentence that names the file."""
 
 import json
 from collections.abc import Callable

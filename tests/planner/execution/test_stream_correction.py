@@ -1,4 +1,4 @@
-"""What a stream makes up for, without a table: the reference is followed by the controller's own rules."""
+"""The corrections of a stream, without a table: the reference follows the controller's rules."""
 
 import pytest
 

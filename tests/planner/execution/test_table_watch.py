@@ -1,4 +1,4 @@
-"""The eye on a motion, here mostly that of a table which is to stand still, in virtual time."""
+"""Monitoring of a motion, here mostly of a table at rest, in virtual time."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def watch_on(
 
 
 def take_nothing(_time_s: float, _position_deg: float) -> None:
-    """Have no use for a reading."""
+    """Ignore a reading."""
 
 
 def times_s(record: Record, source: str) -> list[float]:

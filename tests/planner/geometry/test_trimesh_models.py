@@ -1,4 +1,4 @@
-"""All models that trimesh keeps for its own tests: they load, or are refused for the right reason.
+"""All models of trimesh's own tests: they load, or are refused for the right reason.
 
 The folder is in trimesh's repository (github.com/mikedh/trimesh) and in no package; name it by TRIMESH_MODELS.
 """

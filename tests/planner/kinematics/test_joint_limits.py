@@ -15,7 +15,7 @@ HOME_DEG = np.array([10.0, -60.0, 150.0, 20.0, 40.0, 30.0])
 
 
 def path(joint: int, angles_deg: Sequence[float]) -> FloatArray:
-    """Return joints that stay at home but for one, counted from 1."""
+    """Return joints at home except for one, counted from 1."""
     joints_deg = np.tile(HOME_DEG, (len(angles_deg), 1))
     joints_deg[:, joint - 1] = angles_deg
     return joints_deg

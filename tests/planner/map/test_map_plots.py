@@ -67,7 +67,7 @@ def test_the_same_map_is_the_same_picture_to_the_byte(plot: type, tmp_path: Path
 
 
 def scattered_map() -> ConfigurationMap:
-    """Return a map without symmetry: other numbers of locations and angles, some dark cells here and there."""
+    """Return a map without symmetry: different numbers of locations and angles, some dark cells."""
     rng = np.random.default_rng(4)
     return ConfigurationMap(np.where(rng.random((12, 20)) < 0.3, 0.0, rng.uniform(0.6, 1.0, (12, 20))))
 

@@ -1,4 +1,4 @@
-"""Plans that the arm can follow: kept where it can anyway, found where there is one, and never taken at its word."""
+"""Plans that the arm can follow: unchanged if it can follow them, otherwise searched, and always verified."""
 
 from dataclasses import replace
 
@@ -94,7 +94,7 @@ def test_every_plan_is_one_for_table_and_arm(
 )
 def test_where_a_motion_is_known_one_is_found(seed: int, twist_deg: float, sense: float, step_s: float) -> None:
     random, limits = np.random.default_rng(seed), Limits()
-    # A table that undoes the twist as well as it can, a little unsteadily.
+    # A table that compensates the twist as well as it can, with small variations.
     speeds = -sense * np.minimum(twist_deg / step_s, limits.speed_deg_s) * random.uniform(0.7, 1.0, 24)
     gain = limits.acceleration_deg_s2 * step_s
     accelerations, speed = np.zeros(24), 0.0

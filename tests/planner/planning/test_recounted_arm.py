@@ -1,4 +1,4 @@
-"""The same arm, counted as other makers do: planning and margins must not depend on how a robot counts its joints."""
+"""The same arm with another counting of its joints: planning and margins must not depend on it."""
 
 from dataclasses import replace
 

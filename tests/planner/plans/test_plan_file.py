@@ -22,7 +22,7 @@ def scan() -> Scan:
 
 
 def still_plan(scan: Scan, pauses: tuple[Pause, ...] = ()) -> tuple[Problem, Plan]:
-    """Return a plan that leaves the table where it is, but for its pauses."""
+    """Return a plan in which the table does not move, except in its pauses."""
     count = scan.path.count
     problem = Problem(ConfigurationMap(np.ones((count, 8)), metadata={"configuration": CONFIGURATION.label}))
     angles = np.zeros(count)
@@ -43,7 +43,7 @@ def test_a_plan_comes_back_as_it_was(scan: Scan, tmp_path: Path) -> None:
     assert (loaded.planner, loaded.configuration, loaded.step_s) == ("still", CONFIGURATION.label, plan.step_s)
     assert (loaded.cost, loaded.pauses) == (plan.cost, plan.pauses)
     assert (stored.scan, stored.limits) == (scan.name, problem.limits)
-    assert stored.arm_fault == "out of reach at location 4"  # the table stays where it is
+    assert stored.arm_fault == "out of reach at location 4"  # the table does not move
     np.testing.assert_allclose(stored.arm.T_WS, scan.path.T_WS, atol=1e-8)
     assert stored.arm.cell.arm == scan.cell.arm
     assert [file.name for file in tmp_path.iterdir()] == ["plan.json"]

@@ -17,7 +17,7 @@ def test_a_step_through_an_obstacle_is_found_even_between_columns() -> None:
     problem = Problem(ConfigurationMap(values), step_s=1.0, limits=Limits(200.0, 200.0))
     accelerations = np.zeros(3)
     plan = make_plan(problem, "test", *roll_out(0.0, 40.0, accelerations, 1.0), accelerations)
-    # 0, 40, 80, 120 deg: columns are allowed, but the obstacle at 50 deg of column 1 lies on the way.
+    # 0, 40, 80, 120 deg: columns are allowed, but the obstacle at 50 deg of column 1 is on the path.
     assert verify(problem, plan).forbidden_steps == (1,)
     assert verify(problem, plan).clearance_deg == pytest.approx(10.0)
 

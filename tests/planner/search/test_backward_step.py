@@ -1,4 +1,4 @@
-"""The vectorized step against Bellman's equation written out, state by state, in double precision."""
+"""The vectorized step compared with Bellman's equation, state by state, in double precision."""
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,7 @@ from planner.search.state_grid import Grid, default_grid
 from planner.search.transitions import lay_out_transitions
 from planner.table.motion import Limits
 
-# 37 angles fill no whole vectors; with 12 s a step turns by more than a turn.
+# 37 angles are not a multiple of the vector length; with 12 s a step turns by more than a turn.
 PROBLEM = Problem(synthetic_map(MapFamily(location_count=10, angle_count=37), 0), step_s=0.4)
 TURNING = Problem(PROBLEM.map, step_s=12.0, limits=Limits(40.0, 5.0))
 
@@ -49,7 +49,7 @@ def single(costs: FloatArray) -> CostArray:
 
 
 def random_column(grid: Grid, seed: int) -> tuple[FloatArray, FloatArray, npt.NDArray[np.int32]]:
-    """Return costs of which some are infinite, and sweeps of -1 (forbidden) to a few cells."""
+    """Return costs, some of them infinite, and sweeps of -1 (forbidden) to a few cells."""
     random = np.random.default_rng(seed)
     later = random.uniform(0.0, 50.0, (2 * grid.half_count + 1, grid.angle_count))
     later[random.random(later.shape) < 0.1] = np.inf

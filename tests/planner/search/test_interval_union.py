@@ -1,4 +1,4 @@
-"""Unions of intervals against a circle of points."""
+"""Unions of intervals compared with points of a circle."""
 
 import numpy as np
 from hypothesis import given

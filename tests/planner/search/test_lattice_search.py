@@ -1,4 +1,4 @@
-"""The vectorized search against scipy's shortest path, and against trying every motion."""
+"""The vectorized search compared with scipy's shortest path, and with all motions."""
 
 import math
 

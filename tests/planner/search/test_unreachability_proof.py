@@ -1,4 +1,4 @@
-"""The proof is attacked: there must be none where a motion exists. `python -m tools.bench planner` tries 1000 maps."""
+"""Attacks on the proof: there must be none if a motion exists. `python -m tools.bench planner` tries 1000 maps."""
 
 import math
 
@@ -71,7 +71,7 @@ def test_no_step_between_two_cells_does_more_or_less_than_they_are_said_to_do(
 
 
 def wall_with_a_gap(distance: int) -> Problem:
-    """Return a map that needs a turn by so many samples of 3.6 deg in 10 steps of 0.5 s, from rest to rest."""
+    """Return a map that needs a turn by the given samples of 3.6 deg in 10 steps of 0.5 s, from rest to rest."""
     values = np.ones((14, 100))
     values[1] = values[12] = 0.0
     values[1, 20] = values[12, 20 + distance] = 1.0
@@ -95,7 +95,7 @@ def test_a_proof_that_takes_too_much_work_is_given_up() -> None:
 
 
 def test_reversing_within_one_sample_takes_room() -> None:
-    # A single sample that is passed must be passed at rest, so the table cannot come from 30 deg/s.
+    # A single sample must be passed at rest, so the table cannot come from 30 deg/s.
     values = np.zeros((4, 36))
     values[:, 7] = 1.0
     for speed in (0.0, 1.0, 30.0):

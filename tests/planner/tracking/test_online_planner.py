@@ -1,4 +1,4 @@
-"""Whatever becomes known, and whenever: the table can always come to rest in view, and touches nothing forbidden."""
+"""Whatever becomes known, and whenever: the table can always come to rest in view, and touches no forbidden region."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""The command line: records, reports, replays, exit statuses, and one clear line for what cannot be."""
+"""The command line: records, reports, replays, exit statuses, and one clear line for each error."""
 
 import itertools
 import json
@@ -290,7 +290,7 @@ def test_a_record_of_a_livelier_table_is_not_sent(
 
 
 def hostile(record: Path, *lines: str) -> None:
-    """Let a record claim the mildest profile, and hide other lines in its first case."""
+    """Let a record contain the mildest profile, and hide other lines in its first case."""
     changed = json.loads(record.read_text())
     changed["profile"]["motion"] = {"reach_deg": 1.0, "speed_deg_s": 1.0, "acceleration_deg_s2": 1.0}
     case = next(case for case in changed["cases"] if case["wire"])

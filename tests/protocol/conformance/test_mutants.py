@@ -1,6 +1,6 @@
-"""Each case is shown to fail: it catches by name a table that is wrong in the way that the case is there for.
+"""Each case is shown to fail: it detects the wrong table that belongs to it, by name.
 
-That a right table passes them all is shown in `test_suite`.
+`test_suite` shows that a correct table passes all cases.
 """
 
 import dataclasses
@@ -23,7 +23,7 @@ CATCHES_NONE = {
 
 
 def outcome_of(kind: type[Mutant], identifier: str) -> Outcome:
-    """Run one case against a table of a kind, which is a strict one where the case needs that."""
+    """Run one case against a kind of table, in strict mode if the case needs that."""
     (case,) = chosen_cases([f"{identifier}$"])
     strict = STRICT in case.needs
     profile = load_profile()

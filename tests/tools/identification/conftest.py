@@ -27,7 +27,7 @@ backlash_arcmin = 21.0
 
 @pytest.fixture(scope="session")
 def unseen(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The file of a table that no fit begins from."""
+    """The file of a table that is not the start of any fit."""
     path = tmp_path_factory.mktemp("unseen") / "table.toml"
     path.write_text(UNSEEN, encoding="utf-8")
     return path
@@ -42,12 +42,12 @@ def recording(unseen: Path) -> WireRecording:
 
 @pytest.fixture(scope="session")
 def assumed() -> TableConfig:
-    """What is known of it beforehand: the default table, and that is wrong by much."""
+    """The known constants: those of the default table, some of which are far from the true ones."""
     return load_config()
 
 
 class UnhurriedPort(LatePort):
-    """A port of a busy computer: what is written leaves late now and then, and what comes in is handed over late."""
+    """A port of a busy computer: written bytes are sometimes late, and so are received bytes."""
 
     def __init__(self, port: Serial, seed: int) -> None:
         super().__init__(port)

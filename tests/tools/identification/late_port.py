@@ -1,10 +1,10 @@
-"""A port in virtual time that hands a reply over late."""
+"""A port in virtual time with delayed replies."""
 
 from emulator.protocol_emulator import Serial
 
 
 class LatePort:
-    """The emulator behind what delays its replies: `dawdle` lets the delay pass."""
+    """The emulator behind a source of delay: `dawdle` lets the delay pass."""
 
     def __init__(self, port: Serial) -> None:
         self.port = port

@@ -25,7 +25,7 @@ def test_the_firmware_runs_a_burst_as_predicted_whenever_in_the_braking_the_targ
 
 
 def motions(burst: Burst, chance: Random) -> list[Motion]:
-    """Return the commands of a burst; all but the first come early or late by up to 40 ms."""
+    """Return the commands of a burst; all except the first are early or late by up to 40 ms."""
     return [
         Motion(
             move.send_s + (chance.uniform(-0.04, 0.04) if move.send_s else 0.0),

@@ -22,7 +22,7 @@ def kept(recording: WireRecording, which: NDArray[np.bool_]) -> WireRecording:
 
 
 def later(recording: WireRecording, shift_s: Array) -> WireRecording:
-    """Shift the recorder's clock: at each time of a reading by so much, and with it the commands'."""
+    """Shift the recorder's clock by a given time at each reading, including the commands."""
 
     def shifted(sent: Sent) -> Sent:
         by_s = float(np.interp(sent.time_s, recording.time_s, shift_s))
@@ -53,7 +53,7 @@ def with_the_clock_set_forward(recording: WireRecording) -> WireRecording:
 
 def with_a_timer_of(period_s: float) -> Spoil:
     def spoil(recording: WireRecording) -> WireRecording:
-        """Hand all over at the next tick of an adapter, and ask no sooner."""
+        """Deliver everything at the next tick of an adapter, and send nothing earlier."""
 
         def gathered(time_s: Array) -> Array:
             return np.ceil(time_s / period_s) * period_s

@@ -1,4 +1,4 @@
-"""Recordings that must not be believed, through the command line."""
+"""Recordings that must be refused, from the command line."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -95,7 +95,7 @@ def test_a_spoiled_recording_is_refused_with_its_reason(
 
 
 class GatheringPort(LatePort):
-    """An adapter in virtual time that hands over what came in every 16 ms."""
+    """An adapter in virtual time that delivers received bytes every 16 ms."""
 
     def __init__(self, port: Serial, ticks: int) -> None:
         super().__init__(port)

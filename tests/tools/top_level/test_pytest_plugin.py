@@ -1,4 +1,4 @@
-"""The fixture and the suite as other people's projects use them."""
+"""The fixture and the suite in other projects."""
 
 import os
 import shlex
@@ -117,7 +117,7 @@ def test_a_failure_under_pytest_ends_with_the_command_that_repeats_it_alone(tmp_
 
 @pytest.fixture
 def hang_up() -> Iterator[str]:
-    """A TCP server that hangs up on everybody."""
+    """A TCP server that disconnects every client."""
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def serve() -> None:

@@ -1,4 +1,4 @@
-"""The figures of a gain set against a second way that shares no code with them.
+"""The figures of a gain set compared with a second computation that shares no code with them.
 
 scipy discretizes the plant from the constants of the configuration. The loop's response is computed along a dense line
 of frequencies. The responses over time come from iterating the closed loop's states tick by tick.

@@ -1,4 +1,4 @@
-"""What stands beside the wire: here the programs that a profile names, as the bench of a real table has them."""
+"""Actions besides the wire: here the programs that a profile names, as for a real table."""
 
 import json
 import os
@@ -27,7 +27,7 @@ FAILURE = ("sh", "-c", "echo the relay is stuck >&2; exit 3")
 
 
 def outcomes_with(stand: Programs, *prefixes: str) -> tuple[list[Outcome], Mutant]:
-    """Run cases on a right table that stands at 33 deg, beside which there are programs only."""
+    """Run cases on a correct table that stands at 33 deg; the rig has only programs."""
     port = port_to(Mutant)
     port.write(b"P 33\r")
     port.clock.sleep_s(10)
@@ -109,7 +109,7 @@ def test_a_power_switch_that_fails_leaves_home_where_it_is() -> None:
 
 
 class SwitchesAndFails(Stand):
-    """A power switch that does its work, and then fails."""
+    """A power switch that switches, and then fails."""
 
     capabilities = frozenset({POWER_CYCLE})
 
@@ -128,7 +128,7 @@ def test_a_power_switch_that_fails_when_it_is_done_makes_no_other_place_home() -
     session = Session(RecordedPort(port), load_profile(), SwitchesAndFails(port.table))
     verdicts = [outcome.verdict for outcome in session.run(chosen_cases(["4.6/5", "7.2/1"]))]
     assert verdicts == [Verdict.ERROR, Verdict.PASS]
-    assert round(port.table.status().encoder_deg, 1) == 0.0  # what was 33 deg is 0 now
+    assert round(port.table.status().encoder_deg, 1) == 0.0  # the former 33 deg are now 0
 
 
 @pytest.mark.parametrize("case", ["6.2/1", "6.2/2", "4.3/2"])

@@ -14,7 +14,7 @@ from tests.protocol.conformance.ideal_table import SimulatedClock
 
 
 class Bytes:
-    """A port at which bytes come in at their times, in simulated time."""
+    """A port that receives bytes at given times, in simulated time."""
 
     def __init__(self, coming: Iterator[tuple[float, bytes]]) -> None:
         self.clock = SimulatedClock()
@@ -53,7 +53,7 @@ def wire_with(*coming: tuple[float, bytes], byte_s: float = 0.0) -> Wire:
 
 
 class Flood(Bytes):
-    """A device that sends faster than anybody reads, without end."""
+    """A device that sends without end, faster than the kit reads."""
 
     def __init__(self, data: bytes) -> None:
         super().__init__(iter(()))

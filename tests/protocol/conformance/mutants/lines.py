@@ -13,7 +13,7 @@ from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by
 
 @caught_by("2.1/3")
 class HonorsXoff(Mutant):
-    """XOFF silences it"""
+    """XOFF stops its replies"""
 
     deaf = False
 
@@ -73,7 +73,7 @@ class KeepsHalfLines(Mutant):
 
 @caught_by("3.2/2")
 class CutsLongLines(Mutant):
-    """a long line is cut, and its beginning carried out"""
+    """a long line is cut, and its start executed"""
 
     def receive(self, data: bytes) -> None:
         super().receive(b"\r".join(line[:32] for line in data.split(b"\r")))
@@ -97,7 +97,7 @@ class CountsEachPieceAlone(Mutant):
 
 @caught_by("3.2/3")
 class EditsItsLine(Mutant):
-    """a backspace takes the byte before it back, for terminals"""
+    """a backspace deletes the previous byte, as on terminals"""
 
     def receive(self, data: bytes) -> None:
         super().receive(re.sub(rb"[^\r]?\x08", b"", data))
@@ -105,7 +105,7 @@ class EditsItsLine(Mutant):
 
 @caught_by("3.2/3")
 class IgnoresBadBytes(Mutant):
-    """bad bytes are passed over"""
+    """bad bytes are ignored"""
 
     def receive(self, data: bytes) -> None:
         super().receive(bytes(byte for byte in data if 0x20 <= byte < 0x7F or byte in b"\r\n"))
@@ -153,12 +153,12 @@ class ComputesInMidReply(Mutant):
 
 class ForgivingBuffer(LineBuffer):
     def spoil(self) -> None:
-        """Overlook what was lost."""
+        """Ignore lost bytes."""
 
 
 @caught_by("2.3/2")
 class OverlooksLostBytes(Mutant):
-    """a line that lost bytes is read as if it were whole"""
+    """a line that lost bytes is read as if it were complete"""
 
     def __init__(self, config: TableConfig, seed: int = 0) -> None:
         super().__init__(config, seed)
@@ -167,7 +167,7 @@ class OverlooksLostBytes(Mutant):
 
 @caught_by("2.3/3")
 class LocksUpWhenOverrun(Mutant):
-    """an overrun shuts the receiver for good, as a flag that nobody clears"""
+    """an overrun stops the receiver permanently, because a flag is not cleared"""
 
     def receive(self, data: bytes) -> None:
         if not self._serial.uart.lost_bytes:
@@ -176,7 +176,7 @@ class LocksUpWhenOverrun(Mutant):
 
 @caught_by("3.1/4")
 class WantsWholeLines(Mutant):
-    """a line counts only in one piece"""
+    """a line counts only if it arrives in one piece"""
 
     def receive(self, data: bytes) -> None:
         super().receive(data if data.endswith(b"\r") else b"")
@@ -192,7 +192,7 @@ class ShortLines(Mutant):
 
 @caught_by("3.2/4")
 class LengthBeforeBytes(Mutant):
-    """of two faults that of length is answered"""
+    """of two faults the length error is reported"""
 
     def receive(self, data: bytes) -> None:
         super().receive(re.sub(rb"[^\r]{33,}\r", b" " * 33 + b"\r", data))
@@ -250,7 +250,7 @@ class SilenceEndsALine(Mutant):
 
 @caught_by("3.1/2")
 class SkipsWhatFollowsCr(Mutant):
-    """after CR it waits for LF or for the next CR where LF has come before"""
+    """after CR it waits for LF or for the next CR, if LF was received before"""
 
     def receive(self, data: bytes) -> None:
         super().receive(re.sub(rb"\r\n[^\r]*(?=\r)", b"\r", data))

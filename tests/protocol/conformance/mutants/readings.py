@@ -18,7 +18,7 @@ class TellsTheTarget(Mutant):
 
 @caught_by("4.2/2")
 class StalePosition(Mutant):
-    """the position is looked up ten times a second"""
+    """the position is updated ten times a second"""
 
     last = (-100, b"")
 
@@ -42,7 +42,7 @@ class Modulo360(Mutant):
 
 @caught_by("4.2/4")
 class ReadingLatches(Mutant):
-    """the position is read by way of the latch, which keeps it"""
+    """reading the position overwrites the latch"""
 
     def _reply(self, command: Line) -> bytes:
         if verb_of(command) is Verb.READ_POSITION:

@@ -25,7 +25,7 @@ class SwapsReplies(Mutant):
 
 @caught_by("5.1/2")
 class SwapsRepliesUnderLoad(SwapsReplies):
-    """under load replies change places"""
+    """under load, replies are exchanged"""
 
     def holds_back(self, command: Line) -> bool:  # noqa: ARG002 - each is as good
         return self._serial.uart.waiting_count > 8
@@ -49,7 +49,7 @@ class AnswersTwice(Mutant):
 
 @caught_by("5.1/3")
 class AnnouncesArrival(Mutant):
-    """the end of a motion is announced"""
+    """the end of a motion is reported"""
 
     was_moving = False
 

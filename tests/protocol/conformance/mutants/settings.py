@@ -29,7 +29,7 @@ class AccelerationAtOnce(Mutant):
 
 
 class ForgetsAfterAMotion(Mutant):
-    """Puts settings back to those of power-on once they were used."""
+    """Resets settings to those of power-on once they were used."""
 
     forgotten = ""
 
@@ -113,7 +113,7 @@ class WakesLazy(WakesOtherwise):
 
 @caught_by("6.1/5")
 class KeepsItsCount(Mutant):
-    """the position outlives the power"""
+    """the position is kept without power"""
 
     def reset(self, count: int = 0) -> None:
         super().reset(count or self._loop.state.firmware.counts[-1])

@@ -8,7 +8,7 @@ from tests.protocol.conformance.mutants.mutant import Line, Mutant, Rereads, cau
 
 @caught_by("4.4/1")
 class ShortWayRound(Rereads):
-    """P takes the short way round"""
+    """P takes the shorter direction"""
 
     def instead(self, command: Command) -> Command:
         if command.verb is Verb.MOVE_BY:
@@ -19,7 +19,7 @@ class ShortWayRound(Rereads):
 
 @caught_by("6.1/4")
 class SparesItsCable(Rereads):
-    """backwards it turns by half a turn at most"""
+    """in the backward direction it turns by half a turn at most"""
 
     def instead(self, command: Command) -> Command:
         if command.verb is Verb.MOVE_BY:
@@ -29,7 +29,7 @@ class SparesItsCable(Rereads):
 
 @caught_by("4.4/4")
 class OkIsArrival(Mutant):
-    """P is answered once the table is there"""
+    """P is answered when the table has arrived"""
 
     says = "had arrived when it sent OK"
     held = b""
@@ -70,7 +70,7 @@ class IncrementFromTheDisplay(Rereads):
 
 @caught_by("4.5/3")
 class IgnoresNothing(Rereads):
-    """R 0 is passed over as nothing to do"""
+    """R 0 is ignored because there is nothing to do"""
 
     def instead(self, command: Command) -> Command | None:
         return None if command.verb is Verb.MOVE_BY and value_of(command) == 0 else command
@@ -96,12 +96,12 @@ class PassesOverFarOnes(Rereads):
 
 @caught_by("4.4/2")
 class PassesOverFarTargets(PassesOverFarOnes):
-    """a position beyond the counter is passed over, not refused"""
+    """a position beyond the counter is ignored, not refused"""
 
 
 @caught_by("4.5/5")
 class PassesOverFarIncrements(PassesOverFarOnes):
-    """an increment beyond the counter is passed over, not refused"""
+    """an increment beyond the counter is ignored, not refused"""
 
     verb = Verb.MOVE_BY
 

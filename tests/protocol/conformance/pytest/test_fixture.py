@@ -1,4 +1,4 @@
-"""The table that a test is given, on a pseudo-terminal: it takes faults, and does not go on when the test is over."""
+"""The fixture's table on a pseudo-terminal: it takes faults, and does not continue after the test."""
 
 import time
 from pathlib import Path

@@ -110,7 +110,7 @@ def test_an_interrupted_case_leaves_the_table_where_it_stopped_when_the_session_
 
 
 class InterruptedOnItsWay(RecordedPort):
-    """Ctrl-C comes half a second after the table was sent home."""
+    """Ctrl-C comes half a second after the command to return home."""
 
     def write(self, data: bytes, /) -> int | None:
         written = super().write(data)
