@@ -1,9 +1,9 @@
 """The machine code of a first plan, compiled in two processes.
 
 On a new machine, or after a change of kernels, a plan has to wait for its kernels, and numba compiles sequentially
-within a process. So a second process compiles the kernels of the distance field and of the map, and then those of the
-proof that there is no plan. Meanwhile this process compiles the planner's. A process that needs a kernel which the
-other one is compiling waits (`made_by_one`).
+within a process. So a second process compiles the kernels of the distance field and of the map. Then it compiles those
+of the proof that there is no plan. Meanwhile this process compiles the planner's. A process that needs a kernel which
+the other one is compiling waits (`made_by_one`).
 """
 
 import subprocess

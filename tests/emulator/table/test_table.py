@@ -30,9 +30,7 @@ class TestTheLatch:
 
     @pytest.mark.parametrize("fraction", [0.0, 0.25, 0.999])
     def test_it_is_exact_to_one_count_at_any_speed(self, fraction: float) -> None:
-        """Compared with the straight line between the angles at both ends of the tick, in a motion to 40 deg/s and
-        back.
-        """
+        """Compared with the straight line between the angles at the ends of the tick, in a motion to 40 deg/s."""
         table = Table(UNPACED)
         ask(table, "S 40", "A 100", "R 10")
         for _ in range(120):

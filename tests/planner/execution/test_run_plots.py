@@ -17,7 +17,7 @@ LEAD_S, LAG_S, OFF_DEG = 0.05, 0.02, 0.07
 
 
 def stored_run() -> StoredRun:
-    """Return a run in which the encoder has a constant deviation besides its lag; the reference is early by the lead."""
+    """Return a run in which the encoder has a constant deviation besides its lag; the reference is early."""
     run_input = short_run_input()
     motion = run_input.motion()
     seen = []

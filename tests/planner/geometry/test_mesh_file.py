@@ -175,7 +175,7 @@ WRONG: dict[str, tuple[str, bytes, str]] = {
     "a PLY that announces too much": (
         "ply",
         ply().replace(b"vertex 8", b"vertex 99999999999"),
-        "announces 100000000011 lines",
+        "specifies 100000000011 lines",
     ),
     "a PLY index too large": (
         "ply",
