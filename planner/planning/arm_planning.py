@@ -16,7 +16,8 @@ from planner.plans.problem import Problem
 from planner.search.joint_turns import Margin, lay_out_turns
 from planner.search.lattice import Lattice, speed_unit
 from planner.search.lattice_choice import turn_lattice
-from planner.search.turn_search import MOST_SPEEDS, NotFound, find_path, node_joints
+from planner.search.node_joints import node_joints
+from planner.search.turn_search import MOST_SPEEDS, NotFound, find_path
 from planner.table.motion import Motion
 
 # A motion of minimum cost runs along a limit, so the first search keeps a distance from the limits. If it finds

@@ -2,8 +2,8 @@
 
 Dijkstra's search over columns, forward. If it ends early, the first location without a path is known, and the joint
 that bars the path. A state is (turns, speed i, q). `lattice.py` defines angles, speeds and steps, and `joint_turns.py`
-the turns. For neighboring q, most moves change the turns in the same way. They are collected into runs, so that the
-innermost loop is along q, contiguous and without branches.
+the turns. The moves are taken run by run (`node_joints.py`), so that the innermost loop is along q, contiguous and
+without branches.
 """
 
 from typing import NamedTuple
@@ -13,10 +13,9 @@ import numpy.typing as npt
 
 from planner.arrays import BoolArray, FloatArray, IndexArray
 from planner.kernel import kernel
-from planner.plans.arm_on_path import ArmOnPath
 from planner.plans.problem import Problem, Terms
 from planner.reasons import Reason
-from planner.search.joint_turns import BARS, JOINTS, Turns, count_bar, fitting, turn_change
+from planner.search.joint_turns import BARS, Turns, count_bar, fitting, turn_change
 from planner.search.lattice import (
     ANY_COST,
     Lattice,
@@ -29,6 +28,7 @@ from planner.search.lattice import (
     speed_unit,
 )
 from planner.search.lattice_cost_to_go import TURN_ROUNDING, steps_from
+from planner.search.node_joints import Runs, arrival_costs, gather_runs, reach
 from planner.table.cost import acceleration_cost, speed_cost
 from planner.table.motion import Motion
 
@@ -44,39 +44,6 @@ class NotFound(NamedTuple):
 
     location: int
     limit: Reason | None
-
-
-class _Runs(NamedTuple):
-    """Neighboring moves with the same change of turns.
-
-    Attributes:
-        first: (n_runs,) index of the first node.
-        last: (n_runs,) index after the last node.
-        change: (n_runs,) code of the change.
-        begins: (n_shifts * 2 + 1,) index of the first run of each shift and parity.
-    """
-
-    first: IndexArray
-    last: IndexArray
-    change: IndexArray
-    begins: IndexArray
-
-
-def node_joints(on_path: ArmOnPath, lattice: Lattice) -> FloatArray:
-    """Return the joints at the nodes, in radians, NaN where the arm has no pose: (n + 1, 2, places, 6).
-
-    Node p of a column is in row p & 1 at index (p >> 1) - lattice.first_q + `_reach`.
-    """
-    places = np.arange(-_reach(lattice), lattice.q_count + _reach(lattice))
-    # A node that is reached again after a turn must have the same turn of the joints: it is solved once.
-    solved = np.arange(lattice.q_count) if lattice.is_closed else places
-    offsets_deg = ((2 * (lattice.first_q + solved) + np.array([[0], [1]])) * lattice.node_deg).ravel()
-    result = np.empty((len(lattice.reference.angles_deg), 2, len(places), JOINTS))
-    for k, angle_deg in enumerate(lattice.reference.angles_deg.tolist()):
-        joints, reasons = on_path.solve(np.full(len(offsets_deg), k), angle_deg + offsets_deg)
-        joints[reasons != Reason.REACHED] = np.nan
-        result[k] = joints.reshape(2, -1, JOINTS)[:, places % len(solved) if lattice.is_closed else slice(None)]
-    return result
 
 
 def find_path(
@@ -99,8 +66,8 @@ def find_path(
         return NotFound(0, None)
     for k in range(problem.step_count):
         lay_out_step(problem.terms, _up_to(lattice, k + 1), k, rows)
-        runs = _gather(lattice, turns, joints[k], joints[k + 1])
-        arrivals = _arrivals(lattice, turns, joints[k + 1], rows)
+        runs = gather_runs(lattice, turns, joints[k], joints[k + 1])
+        arrivals = arrival_costs(lattice, turns, joints[k + 1], rows)
         _advance(problem.terms, lattice, k, turns, runs, rows, arrivals, now, later, choices[k])
         now, later = later, now
         if not np.isfinite(now).any():
@@ -119,7 +86,7 @@ def _start_costs(problem: Problem, lattice: Lattice, joints: FloatArray, turns: 
         i = s - lattice.half_count
         angle_deg = lattice.reference.angles_deg[0] + (2 * (q + lattice.first_q) + i) * lattice.node_deg
         if problem.map.is_allowed(0, float(angle_deg)):
-            costs[fits[i & 1][:, q + (i >> 1) + _reach(lattice)], s, q] = 0.0
+            costs[fits[i & 1][:, q + (i >> 1) + reach(lattice)], s, q] = 0.0
     return costs
 
 
@@ -147,57 +114,12 @@ def _first_bar(
 
 
 @kernel
-def _reach(lattice: Lattice) -> int:
-    """Return the number of entries of joints before `first`, and after the last q: as far as the end of a step."""
-    return 2 * lattice.half_count + 2
-
-
-@kernel
-def _gather(lattice: Lattice, turns: Turns, before: FloatArray, after: FloatArray) -> _Runs:
-    """Return the moves of a step that no joint speed bars, from joints (2, places, 6) to joints.
-
-    The moves by `shift` nodes from nodes of a parity start at `begins[2 * (shift + 2 * half_count) + parity]`.
-    """
-    most, places = 2 * lattice.half_count, before.shape[1]
-    first, last = np.empty((4 * most + 2) * places, dtype=np.int64), np.empty((4 * most + 2) * places, dtype=np.int64)
-    change, begins = np.empty_like(first), np.zeros(4 * most + 3, dtype=np.int64)
-    number = 0
-    for shift in range(-most, most + 1):
-        for parity in range(2):
-            ahead, code = (parity + shift) >> 1, -1
-            for place in range(max(0, -ahead), min(places, places - ahead)):
-                now = turn_change(turns, before[parity, place], after[(parity + shift) & 1, place + ahead])
-                if now >= 0 and now != code:
-                    first[number], change[number] = place, now
-                    number += 1
-                if now >= 0:
-                    last[number - 1] = place + 1
-                code = now
-            begins[2 * (shift + most) + parity + 1] = number
-    return _Runs(first[:number], last[:number], change[:number], begins)
-
-
-@kernel
-def _arrivals(lattice: Lattice, turns: Turns, joints: FloatArray, rows: StepRows) -> FloatArray:
-    """Return the cost of arriving at the nodes of a column on each of the turns: (n_turns, 2, places of rows)."""
-    costs = np.full((len(turns.turns), *rows.value_cost.shape), np.inf)
-    ahead = _reach(lattice) - margin(lattice)
-    for parity in range(2):
-        fits = fitting(turns, joints[parity])
-        for c in range(len(turns.turns)):
-            for place in range(costs.shape[2]):
-                if fits[c, place + ahead] and rows.value_cost[parity, place] < ANY_COST:
-                    costs[c, parity, place] = rows.value_cost[parity, place]
-    return costs
-
-
-@kernel
 def _advance(
     terms: Terms,
     lattice: Lattice,
     k: int,
     turns: Turns,
-    runs: _Runs,
+    runs: Runs,
     rows: StepRows,
     arrivals: FloatArray,
     now: FloatArray,
@@ -255,7 +177,7 @@ def _move(
     i: int,
     j: int,
     turns: Turns,
-    runs: _Runs,
+    runs: Runs,
     arrivals: FloatArray,
     leaving: FloatArray,
     later: FloatArray,
@@ -263,7 +185,7 @@ def _move(
 ) -> None:
     """Reduce the costs of the next column to those of one step, from speed i to j and from one combination of turns."""
     half, count = lattice.half_count, lattice.q_count
-    start, ahead = _reach(lattice) + (i >> 1), margin(lattice) + (j >> 1)
+    start, ahead = reach(lattice) + (i >> 1), margin(lattice) + (j >> 1)
     number = 2 * (i + j + 2 * half) + (i & 1)
     for run in range(runs.begins[number], runs.begins[number + 1]):
         onward = turns.after[c, runs.change[run]]
@@ -303,7 +225,7 @@ def _count_bars(
     bars: IndexArray,
 ) -> None:
     """Count the table's moves in a step that each bar of the arm prevents, (BARS,): see `count_bar`."""
-    half, reach, barrier = lattice.half_count, _reach(lattice), np.empty(lattice.q_count)
+    half, ahead, barrier = lattice.half_count, reach(lattice), np.empty(lattice.q_count)
     for i in range(-half, half + 1):
         first, last = steps_from(terms, lattice, k, i)
         for j in range(first, last + 1):
@@ -313,8 +235,8 @@ def _count_bars(
                 value_cost = rows.value_cost[j & 1, (m + i) % lattice.q_count + (j >> 1) + margin(lattice)]
                 is_inside = lattice.is_closed or 0 <= m + i < lattice.q_count
                 if is_inside and barrier[m] < np.inf and value_cost < ANY_COST:
-                    start = before[i & 1, m + (i >> 1) + reach]
-                    end = after[j & 1, m + i + (j >> 1) + reach]
+                    start = before[i & 1, m + (i >> 1) + ahead]
+                    end = after[j & 1, m + i + (j >> 1) + ahead]
                     for c in range(len(turns.turns)):
                         if alive[c, i + half, m]:
                             count_bar(turns, c, start, end, bars)
@@ -325,7 +247,7 @@ def _backtrack(
     lattice: Lattice, turns: Turns, joints: FloatArray, choices: ChoiceArray, c: int, i: int, m: int
 ) -> tuple[int, IndexArray]:
     """Return the first q, and i at each column (n + 1,), of the best path to a state of the last column."""
-    steps, half, reach = len(choices), lattice.half_count, _reach(lattice)
+    steps, half, ahead = len(choices), lattice.half_count, reach(lattice)
     speeds = np.empty(steps + 1, dtype=np.int64)
     speeds[steps] = i
     for k in range(steps, 0, -1):
@@ -333,8 +255,8 @@ def _backtrack(
         start = m - i
         if lattice.is_closed:
             start %= lattice.q_count
-        before = joints[k - 1, i & 1, start + (i >> 1) + reach]
-        code = turn_change(turns, before, joints[k, j & 1, start + i + (j >> 1) + reach])
+        before = joints[k - 1, i & 1, start + (i >> 1) + ahead]
+        code = turn_change(turns, before, joints[k, j & 1, start + i + (j >> 1) + ahead])
         for earlier in range(len(turns.turns)):
             if turns.after[earlier, code] == c:
                 c = earlier

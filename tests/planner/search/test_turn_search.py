@@ -15,8 +15,9 @@ from planner.plans.problem import Problem
 from planner.reasons import Reason
 from planner.search.joint_turns import Margin, lay_out_turns
 from planner.search.lattice import Lattice
+from planner.search.node_joints import node_joints
 from planner.search.reference_motion import reference_motion
-from planner.search.turn_search import NotFound, find_path, node_joints
+from planner.search.turn_search import NotFound, find_path
 from planner.table.motion import Limits, Motion
 from tests.planner.winding_arm import least_cost_followed, winding_arm
 
