@@ -4,11 +4,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from emulator.config.toml_section import ConfigError
-
 from emulator.avr.header import header_text
 from emulator.avr.toolchain import CONSTANTS
-from emulator.config.table_config import load_config
+from emulator.config.table_config import ConfigError, load_config
 from protocol.command_line import Parser, program_name
 from protocol.whole_file import write_whole
 

@@ -115,7 +115,7 @@ class Chip:
     @property
     def mean_tick(self) -> float:
         """The cycles of the mean tick, interrupts included."""
-        return float(self._shown.tick_cycles) / max(1, self._shown.ticks)
+        return float(self._shown.tick_cycles) / max(1, int(self._shown.ticks))
 
     @property
     def lost_edges(self) -> int:

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from emulator.avr.errors import ToolchainError
 from emulator.avr.header import header_text
 from emulator.config.table_config import TableConfig
-from protocol.kept_code import cache_root
+from protocol.kept_file import cache_root
 from protocol.whole_file import whole_file
 
 FIRMWARE = Path(__file__).with_name("firmware")

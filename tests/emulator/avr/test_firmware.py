@@ -1,4 +1,4 @@
-"""The compiled firmware beside the emulator: the same duty at every tick, the same replies, in the time that there is."""
+"""The compiled firmware beside the emulator: equal duty at every tick, equal replies, in the time that there is."""
 
 import pytest
 from hypothesis import HealthCheck, given, settings

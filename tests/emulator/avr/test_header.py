@@ -5,13 +5,12 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from emulator.config.toml_section import ConfigError
 from hypothesis import given
 from hypothesis import strategies as st
 
 from emulator.avr.header import CLOCK_HZ, digest_of, header_text, uart_of
 from emulator.avr.toolchain import CONSTANTS
-from emulator.config.table_config import TableConfig, load_config
+from emulator.config.table_config import ConfigError, TableConfig, load_config
 
 DEFAULT = load_config()
 

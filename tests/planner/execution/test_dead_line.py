@@ -40,6 +40,7 @@ def ways_after_a_cut(
 
     def look(_: int, __: int) -> None:
         if next(seen) % every == 0:
+            assert isinstance(port.table, Table)
             snapshots.append(port.table.snapshot())
 
     table, wire = TableClient(port, timeout_s=0.5), Wire()

@@ -125,6 +125,7 @@ def test_a_power_switch_that_fails_when_it_is_done_makes_no_other_place_home() -
     port = port_to(Mutant)
     port.write(b"P 33\r")
     port.clock.sleep_s(10)
+    assert isinstance(port.table, Table)
     session = Session(RecordedPort(port), load_profile(), SwitchesAndFails(port.table))
     verdicts = [outcome.verdict for outcome in session.run(chosen_cases(["4.6/5", "7.2/1"]))]
     assert verdicts == [Verdict.ERROR, Verdict.PASS]
