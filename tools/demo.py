@@ -18,7 +18,6 @@ from planner.__main__ import main as planner
 from protocol import TableError
 from protocol.command_line import Parser, program_name
 from protocol.ending import ended
-from tools.preemption import draw_preemption, start_emulator
 
 SCAN = "cylinder"
 TIME_SCALE = 1.5
@@ -43,6 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     if options.job == "preemption":
+        from tools.preemption import draw_preemption  # noqa: PLC0415  # it loads matplotlib
+
         print(draw_preemption(options.out))
         return 0
     return scan_on_a_pty(options.out)
@@ -50,6 +51,8 @@ def _run(options: argparse.Namespace) -> int:
 
 def scan_on_a_pty(out: Path) -> int:
     """Plan, run, verify and show the scan; return the first exit status that is not 0."""
+    from tools.preemption import start_emulator  # noqa: PLC0415  # it loads matplotlib
+
     command = ["plan", SCAN, "--out", str(out)]
     _say(f"python -m planner {' '.join(command)}")
     if status := planner(command):

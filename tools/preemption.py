@@ -13,7 +13,7 @@ from emulator.trace import read_trace
 from planner.plot_style import save_picture
 from protocol import TableClient
 from protocol.own_program import own_environment, own_program
-from tools.plot_trace import draw_trace
+from tools.trace_figure import draw_trace
 
 STEPS = (  # time in seconds, maximum speed deg/s, acceleration deg/s2, target deg
     (0.0, 20.0, 20.0, 60.0),

@@ -9,7 +9,8 @@ from planner.plans.plan import Plan
 from planner.plans.verification import verify
 from planner.search.lattice import speed_unit
 from planner.search.lattice_choice import turn_lattice
-from tools.figures import (
+from tools.figures import NAMES, main
+from tools.paper_figures import (
     FIGURES,
     MOMENTS,
     OBSTACLE_RAYS,
@@ -17,13 +18,16 @@ from tools.figures import (
     SHARED_SPEED_COUNT,
     SHARED_WORK,
     complete_rays,
-    main,
     obstacle_problem,
     shared_problem,
 )
 
 # Between the second obstacle's samples, in degrees, and halfway along it.
 SECOND_OBSTACLE_DEG, SECOND_OBSTACLE_LOCATION = (54.0, 144.0), 64
+
+
+def test_the_command_line_names_every_figure() -> None:
+    assert list(FIGURES) == list(NAMES)
 
 
 def shot() -> Plan:

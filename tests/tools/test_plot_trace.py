@@ -5,8 +5,15 @@ import pytest
 
 from emulator import Table, load_config
 from emulator.trace import TraceWriter, read_trace
+from tools import trace_figure
 from tools.command_marks import commands_of
-from tools.plot_trace import SIGNALS, draw_trace, main
+from tools.plot_trace import main
+from tools.trace_figure import draw_trace
+from tools.trace_signals import SIGNALS
+
+
+def test_the_command_line_names_every_signal_of_the_panels() -> None:
+    assert [name for panel in trace_figure._PANELS for name in panel.signals] == list(SIGNALS)  # noqa: SLF001  # the table
 
 
 @pytest.fixture(scope="module")

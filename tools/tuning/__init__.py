@@ -4,7 +4,7 @@ The names below are the public interface; docs/tuning.md, "In Python", shows how
 """
 
 from emulator.config.table_config import GainsConfig
-from tools.tuning.bounds import Limits
+from tools.bounds import Limits
 from tools.tuning.check import Check, Curve, Figure
 from tools.tuning.checks import EmulatorChecks, check_on_emulator
 from tools.tuning.gain_files import gains_config

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from emulator.config.table_config import TableConfig
 from protocol.page import Cell, Marked, table
-from tools.tuning.bounds import Limits
+from tools.bounds import Limits
 from tools.tuning.gain_design import Design
 from tools.tuning.linear_model import duty_gains
 from tools.tuning.loop_figures import LoopFigures

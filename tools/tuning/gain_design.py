@@ -14,7 +14,7 @@ import numpy as np
 from emulator.firmware.fixed_point import GAIN_BITS, INTEGRAL_GAIN_BITS
 from emulator.firmware.pid import Gains
 from emulator.int32 import INT32_MAX
-from tools.tuning.bounds import Bound, violation
+from tools.bounds import Bound, violation
 from tools.tuning.frequency_response import Array
 from tools.tuning.linear_model import Teeth, speed_quantum_deg_s, time_constant_s
 from tools.tuning.loop_figures import LoopFigures, Loops, joined, loop_figures

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from emulator.config.table_config import TableConfig
-from tools.tuning.bounds import Bound
+from tools.bounds import Bound
 from tools.tuning.frequency_response import Array
 from tools.tuning.gain_design import Design
 from tools.tuning.loop_figures import LoopFigures, Loops, joined, loop_figures

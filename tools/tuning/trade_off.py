@@ -5,8 +5,8 @@ from typing import NamedTuple
 from emulator.config.constants import fixed_gains
 from emulator.config.table_config import ConfigError, GainsConfig, TableConfig
 from emulator.firmware.pid import Gains
+from tools.bounds import Limits
 from tools.emulated import with_gains
-from tools.tuning.bounds import Limits
 from tools.tuning.gain_design import Design, Scan, judged
 from tools.tuning.gain_files import gains_config
 from tools.tuning.nonlinear_checks import creep

@@ -5,7 +5,7 @@ import numpy as np
 from emulator.firmware.pid import Gains
 from protocol.page import Cell, Kind, Marked, Origin, details, figure, heading, page, paragraph, table
 from protocol.page import verdict as headline
-from tools.tuning.bounds import Bound
+from tools.bounds import Bound
 from tools.tuning.check import Figure
 from tools.tuning.checks import differs
 from tools.tuning.comparison_report import textbook_table, trade_table

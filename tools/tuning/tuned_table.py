@@ -10,8 +10,8 @@ import numpy as np
 from emulator.config.constants import fixed_gains
 from emulator.config.table_config import GainSetsConfig, TableConfig
 from emulator.firmware.pid import Gains
+from tools.bounds import Limits, TuningError
 from tools.emulated import with_gains
-from tools.tuning.bounds import Limits
 from tools.tuning.check import Check
 from tools.tuning.checks import Difference, all_checks, differences
 from tools.tuning.gain_design import Design, Scan, scan
@@ -24,10 +24,6 @@ from tools.tuning.trade_off import Trade, textbook_designs, trade_off
 from tools.tuning.way_out import SetDesigns, both_designs, changes, eased_limits, proved
 
 _LEAST_ANSWER_S = 0.5
-
-
-class TuningError(ValueError):
-    """An option that cannot be used, or bounds that cannot be satisfied. The message states which, and what works."""
 
 
 class TunedSet(NamedTuple):

@@ -5,7 +5,7 @@ from functools import partial
 from itertools import combinations
 from typing import NamedTuple
 
-from tools.tuning.bounds import Bound, Limits, violation
+from tools.bounds import Bound, Limits, violation
 from tools.tuning.gain_design import LEAST_LAG, LEAST_LOAD_PEAK, Design, Objective, Scan, design
 
 _MOST_EASED = 2

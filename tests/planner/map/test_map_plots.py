@@ -17,7 +17,7 @@ from planner.plans.problem import Problem
 from planner.plot_style import DPI, WIDTH_IN
 from planner.reasons import Reason
 from tests.planner.drawn import Drawn
-from tools import figures
+from tools import paper_figures
 
 PAIRS = tuple(f"part {i} and table" for i in range(8))
 
@@ -96,7 +96,7 @@ def test_a_plan_lies_on_the_map_in_the_colors_of_its_reasons() -> None:
 
 def map_of_the_paper() -> Figure:
     figure = Figure(figsize=(6.0, 4.0))
-    figures._draw_map(figure.subplots(), scattered_map())  # noqa: SLF001 - the part of Fig. 6 to 9 that draws the map
+    paper_figures._draw_map(figure.subplots(), scattered_map())  # noqa: SLF001 - the part of Fig. 6 to 9 that draws the map
     return figure
 
 

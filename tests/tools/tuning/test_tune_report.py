@@ -4,7 +4,7 @@ from itertools import pairwise
 import pytest
 
 from emulator.config.table_config import load_config
-from tools.tuning.bounds import Limits
+from tools.bounds import Limits
 from tools.tuning.checks import Difference
 from tools.tuning.tune_plots import plots
 from tools.tuning.tune_report import tune_report

@@ -1,14 +1,21 @@
 """The bounds for a gain set, and its distance from each."""
 
 from math import ceil, floor, isinf, log10
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tools.tuning.frequency_response import Array
-from tools.tuning.loop_figures import LoopFigures
+if TYPE_CHECKING:  # the command line shows the limits without loading what computes the figures
+    from tools.tuning.loop_figures import LoopFigures
+
+Array = NDArray[np.float64]
 
 _EASE = 0.01
+
+
+class TuningError(ValueError):
+    """An option that cannot be used, or bounds that cannot be satisfied. The message states which, and what works."""
 
 
 class Bound(NamedTuple):
@@ -22,7 +29,7 @@ class Bound(NamedTuple):
     unit: str
     flag: str  # option of the command line, in the displayed unit
 
-    def excess(self, figures: LoopFigures) -> Array:
+    def excess(self, figures: "LoopFigures") -> Array:
         """Return by how much the figure exceeds the limit, as a share of it; negative if the bound is satisfied."""
         value = getattr(figures, self.figure)
         share: Array = value / self.limit - 1.0 if self.at_most else 1.0 - value / self.limit
@@ -85,7 +92,7 @@ class Limits(NamedTuple):
         )
 
 
-def violation(bounds: tuple[Bound, ...], figures: LoopFigures) -> Array:
+def violation(bounds: tuple[Bound, ...], figures: "LoopFigures") -> Array:
     """Return the sum of all excesses: 0 if all bounds are satisfied; an unstable loop satisfies none."""
     total = np.sum([np.maximum(bound.excess(figures), 0.0) for bound in bounds], axis=0)
     result: Array = np.where(figures.stable, total, np.inf)
