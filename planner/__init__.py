@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from planner.api import build_maps, plan, run, with_factors
+    from planner.api import build_maps, plan, run, tracker, with_factors
     from planner.cell.scan import Scan, load_scan
     from planner.errors import PlannerError
     from planner.execution.run import RunOptions
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from planner.planning.scan_planning import PlannedScan
     from planner.plans.plan import Infeasibility, NoPlan, Plan, make_plan
     from planner.plans.problem import Problem
+    from planner.tracking.tracker import Tracker, TrackSettings
 
 _HOME = {
     "Configuration": "planner.kinematics.configuration",
@@ -37,12 +38,15 @@ _HOME = {
     "RatedPoses": "planner.kinematics.value",
     "RunOptions": "planner.execution.run",
     "Scan": "planner.cell.scan",
+    "TrackSettings": "planner.tracking.tracker",
+    "Tracker": "planner.tracking.tracker",
     "UserFactor": "planner.kinematics.value",
     "build_maps": "planner.api",
     "load_scan": "planner.cell.scan",
     "make_plan": "planner.plans.plan",
     "plan": "planner.api",
     "run": "planner.api",
+    "tracker": "planner.api",
     "with_factors": "planner.api",
 }
 """The module of each public name."""
@@ -59,12 +63,15 @@ __all__ = [
     "RatedPoses",
     "RunOptions",
     "Scan",
+    "TrackSettings",
+    "Tracker",
     "UserFactor",
     "build_maps",
     "load_scan",
     "make_plan",
     "plan",
     "run",
+    "tracker",
     "with_factors",
 ]
 

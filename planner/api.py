@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from planner.cell.scan import Scan
-from planner.defaults import DEFAULT_PLANNER
+from planner.defaults import DEFAULT_PLANNER, RECEDING
 from planner.execution.run import Finished, RunOptions, run_plan
 from planner.kinematics.configuration import Configuration
 from planner.kinematics.value import UserFactor
@@ -17,6 +17,8 @@ from planner.planning.own_planners import checked, planner_named
 from planner.planning.scan_planning import PlannedScan, plan_scan
 from planner.plans.plan import NoPlan, Outcome, Planner
 from planner.plans.problem import Problem
+from planner.table.wire import Wire
+from planner.tracking.tracker import Tracker, TrackSettings
 
 
 def with_factors(scan: Scan, *factors: UserFactor) -> Scan:
@@ -92,3 +94,29 @@ def run(
         return run_plan(Path(planned), Path(out), chosen)
     with TemporaryDirectory() as folder:
         return run_plan(planned.save(folder), Path(out), chosen)
+
+
+def tracker(
+    scan: Scan,
+    planner: str = RECEDING,
+    configuration: str = "best",
+    angle_count: int = 360,
+    view: int = 50,
+    wire: Wire | None = None,
+) -> Tracker:
+    """Return a tracker of a scan whose locations become known while the table moves; it knows none yet.
+
+    Args:
+        scan: the cell, the limits, the weights and the time step; its path is not used.
+        planner: `receding` or `ray_shooting`.
+        configuration: an arm configuration such as `LEFTY-ABOVE-NOFLIP`, or `best`.
+        angle_count: number of table angles over one turn.
+        view: maximum number of locations that are known ahead of the table.
+        wire: baud rate and decimal places; None: 9600 baud, one decimal place.
+
+    Raises:
+        PlannerError: the planner is not one of these, or the time step is too short for the wire.
+    """
+    names = list(Configuration) if configuration == "best" else [Configuration.parse(configuration)]
+    settings = TrackSettings(planner, view)
+    return Tracker(map_problem(scan), scan.path.step_s, scan.limits, scan.weights, wire, settings, names, angle_count)

@@ -77,7 +77,7 @@ class RayShooting:
         self._rays = rays or Rays()
 
     def accelerations_deg_s2(self, window: Window, speed_deg_s: float) -> FloatArray:
-        """Return the paper's set, reduced where the speed would pass its limit."""
+        """Return the paper's set, and behind it the ways to brake, which cost more than any ray."""
         terms = window.terms
         rays = ray_accelerations(self._rays.rays, terms.acceleration_limit_deg_s2)
         return np.concatenate((rays, _brakings(window, speed_deg_s)))
@@ -85,10 +85,12 @@ class RayShooting:
     def step_costs(
         self, online: OnlineStep, window: Window, angle_deg: float, speed_deg_s: float, accelerations: FloatArray
     ) -> FloatArray:
-        """Return the cost of each ray."""
+        """Return the cost of each ray; the paper shoots no other, so a way to brake is the last resort."""
         nothing = CostToGo(online.grid, np.empty((0, *online.layers.shape[1:]), dtype=np.float32), 1.0)
         last = min(self._rays.horizon, window.last)
-        return _ray_costs(window.terms, last, nothing, angle_deg, speed_deg_s, accelerations)
+        costs = _ray_costs(window.terms, last, nothing, angle_deg, speed_deg_s, accelerations)
+        costs[self._rays.rays :] = np.inf
+        return costs
 
     def rest_costs(self, online: OnlineStep, window: Window, angle_deg: float) -> FloatArray:  # noqa: ARG002 - see Method
         """Return the way from the present angle."""

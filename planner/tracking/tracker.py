@@ -311,7 +311,11 @@ class Tracker(FollowedReference):
         )
         return columns
 
-    def begin_s(self, wire: Wire, latched: MotionCommand | None) -> float | None:  # noqa: ARG002 - see `Commands`
+    def begin_s(
+        self,
+        wire: Wire | None = None,  # noqa: ARG002 - see `Commands`
+        latched: MotionCommand | None = None,  # noqa: ARG002 - the same
+    ) -> float | None:
         """Return when to ask for the next command, without lead; None when the table stops at the path's end."""
         if self._is_over:
             return None

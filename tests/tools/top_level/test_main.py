@@ -77,7 +77,7 @@ def completed(line: str, folder: Path) -> set[str]:
 
 
 def test_commands_and_their_options_are_completed(tmp_path: Path) -> None:
-    assert completed("seventh-axis t", tmp_path) == {"table", "tune", "trace"}
+    assert completed("seventh-axis t", tmp_path) == {"table", "tune", "trace", "track"}
     assert completed("seventh-axis table --t", tmp_path) == {"--tcp", "--time-scale", "--trigger-hz", "--trace"}
     assert completed("seventh-axis plan cylinder --sm", tmp_path) == {"--smooth"}
     assert completed("seventh-axis control ./socket fault-h", tmp_path) == {"fault-half-reply", "fault-hang-up"}

@@ -33,6 +33,7 @@ COMMANDS = {
     "map": Command("planner.__main__", "compute and draw a scan's configuration map", by_name=True),
     "plan": Command("planner.__main__", "plan the table's motion along a scan", by_name=True),
     "run": Command("planner.__main__", "carry out a plan on a table, and verify the motion", by_name=True),
+    "track": Command("planner.__main__", "plan the table while it moves, as locations become known", by_name=True),
     "scan": Command("planner.__main__", "scan a workpiece with a simulated probe", by_name=True),
     "show": Command("planner.__main__", "show a run as one HTML page", by_name=True),
     "conform": Command("protocol.conformance.__main__", "test a table against the specification"),
