@@ -26,6 +26,7 @@ from protocol.ending import ended
 from tools.lockstep import PartingError, run_edges, run_lockstep, run_phases
 
 MUTANTS = Path(__file__).with_name("firmware_mutants.toml")
+PROFILE = FIRMWARE.with_name("profile.toml")
 _LOCKSTEP_TICKS = 30_000
 _EDGE_TICKS = 400
 _SEED = 2
@@ -85,7 +86,7 @@ def _found(check: str, firmware: Path) -> str:
 
 def compiled_profile() -> Profile:
     """Return the profile of the compiled table: its line does not show that the client has gone."""
-    return load_profile(Path(MUTANTS).parents[1] / "emulator" / "avr" / "profile.toml")
+    return load_profile(PROFILE)
 
 
 def failing_case(url: str, prefixes: Sequence[str]) -> str:

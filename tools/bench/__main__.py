@@ -12,7 +12,7 @@ from importlib import import_module
 from protocol.command_line import Parser, program_name
 from protocol.ending import ended
 
-SUBJECTS = ("calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream", "track")
+SUBJECTS = ("avr", "calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream", "track")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -30,6 +30,8 @@ def _run(options: argparse.Namespace, benches: Mapping[str, Callable[..., None]]
             bench(sys.stdout, options.plants, options.seed, options.jobs, options.pty, options.wide)
         elif subject == "track":
             bench(sys.stdout, options.pty)
+        elif subject == "avr":
+            bench(sys.stdout, options.ticks, options.lines, options.seed)
         else:
             bench(sys.stdout)
     return 0
@@ -53,8 +55,13 @@ def _parser() -> Parser:
     identify.add_argument(
         "--plants", metavar="N", type=int, help="number of random tables (default: 10; with --wide 40)"
     )
-    identify.add_argument("--seed", metavar="N", type=int, default=1, help="of the first table (default 1)")
+    identify.add_argument(
+        "--seed", metavar="N", type=int, default=1, help="of the first table, or of the client of avr (default 1)"
+    )
     identify.add_argument("--jobs", metavar="N", type=int, default=2, help="tables at once (default 2)")
+    avr = parser.add_argument_group("for avr")
+    avr.add_argument("--ticks", metavar="N", type=int, default=10_000_000, help="in lockstep (default: %(default)s)")
+    avr.add_argument("--lines", metavar="N", type=int, default=100_000, help="of fuzzing (default: %(default)s)")
     return parser
 
 
