@@ -22,12 +22,13 @@ from tools.lockstep import PartingError, run_edges
 FLASH_BYTES = 32 * 1024
 RAM_BYTES = 2 * 1024
 _TICKS = 3000
+_EXPECTED = (ConfigError, ToolchainError, ChipError, PartingError, subprocess.CalledProcessError)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Build the firmware, and return the exit status."""
     options = parser().read(arguments)
-    return ended("firmware", lambda: _run(options))
+    return ended("firmware", lambda: _run(options), *_EXPECTED)
 
 
 def parser() -> Parser:
@@ -44,20 +45,16 @@ def parser() -> Parser:
 
 
 def _run(options: argparse.Namespace) -> int:
-    try:
-        config = load_config(options.config)
-        built = build_firmware(config, gains=options.gains)
-        elf, hexadecimal = options.out / "table.elf", options.out / "table.hex"
-        options.out.mkdir(parents=True, exist_ok=True)
-        with whole_file(elf) as partial:
-            copyfile(built, partial)
-        with whole_file(hexadecimal) as partial:
-            subprocess.run(["avr-objcopy", "-O", "ihex", str(elf), str(partial)], check=True)  # noqa: S607  # on the path, as avr-gcc
-        for line in figures(config, elf):
-            print(line)
-    except (ConfigError, ToolchainError, ChipError, PartingError, OSError, subprocess.CalledProcessError) as error:
-        print(f"firmware: {error}", file=sys.stderr)
-        return 2
+    config = load_config(options.config)
+    built = build_firmware(config, gains=options.gains)
+    elf, hexadecimal = options.out / "table.elf", options.out / "table.hex"
+    options.out.mkdir(parents=True, exist_ok=True)
+    with whole_file(elf) as partial:
+        copyfile(built, partial)
+    with whole_file(hexadecimal) as partial:
+        subprocess.run(["avr-objcopy", "-O", "ihex", str(elf), str(partial)], check=True)  # noqa: S607  # on the path, as avr-gcc
+    for line in figures(config, elf):
+        print(line)
     return 0
 
 

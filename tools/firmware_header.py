@@ -1,5 +1,6 @@
 """The constants of the compiled firmware: a C header made of a table's TOML file."""
 
+import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,18 +9,19 @@ from emulator.avr.header import header_text
 from emulator.avr.toolchain import CONSTANTS
 from emulator.config.table_config import ConfigError, load_config
 from protocol.command_line import Parser, program_name
+from protocol.ending import ended
 from protocol.whole_file import write_whole
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the header, and return the exit status."""
     options = parser().read(arguments)
-    try:
-        source = "emulator/config/default.toml" if options.config is None else options.config.name
-        write_whole(options.out, header_text(load_config(options.config), source))
-    except (ConfigError, OSError) as error:
-        print(f"firmware_header: {error}", file=sys.stderr)
-        return 2
+    return ended("firmware_header", lambda: _run(options), ConfigError)
+
+
+def _run(options: argparse.Namespace) -> int:
+    source = "emulator/config/default.toml" if options.config is None else options.config.name
+    write_whole(options.out, header_text(load_config(options.config), source))
     return 0
 
 

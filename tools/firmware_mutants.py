@@ -110,7 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = Parser(prog=program_name("tools.firmware_mutants"), description="Plant faults in the compiled firmware.")
     parser.add_argument("name", nargs="*", help="only mutants whose name contains it")
     options = parser.parse_args(arguments)
-    return ended("firmware_mutants", lambda: _run(options))
+    return ended("firmware_mutants", lambda: _run(options), ToolchainError)
 
 
 def _run(options: argparse.Namespace) -> int:
