@@ -45,6 +45,9 @@ RUN_ON_DEG = 90.0
 """Maximum angle that the table runs on if the line fails."""
 PROFILES_HZ = 25.0
 
+REPORT_FILE = "report.html"
+"""The name of the page in a folder of results."""
+
 
 def shipped_scans() -> list[str]:
     """Return the names of the shipped scans."""

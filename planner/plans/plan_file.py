@@ -19,6 +19,7 @@ from planner.plans.problem import Problem
 from planner.plans.verification import verify
 from planner.table.cost import PathCost, Weights
 from planner.table.motion import Limits
+from protocol.command_line import program_name
 from protocol.data_file import DataFileError, read_json
 from protocol.software_version import software_version
 from protocol.whole_file import write_whole
@@ -139,7 +140,7 @@ def _stored(file: Path, document: dict[str, Any]) -> StoredPlan:
     if "arm" not in document:
         raise PlanFileError(
             f"{file}: does not contain the arm, so its limits cannot be checked (an earlier version wrote it);"
-            f" create the plan again: python -m planner plan {scan} --out {file.parent}"
+            f" create the plan again: {program_name('planner')} plan {scan} --out {file.parent}"
         )
     table, cost = document["table"], document["cost"]
     return StoredPlan(
