@@ -31,7 +31,7 @@ _DECIMALS = 9
 
 
 class PlanFileError(PlannerError):
-    """A file that cannot be read, holds no plan, or is damaged."""
+    """A file that cannot be read, contains no plan, or is damaged."""
 
 
 class StoredPlan(NamedTuple):
@@ -120,7 +120,7 @@ def load_plan(file: Path) -> StoredPlan:
     except DataFileError as error:
         raise PlanFileError(str(error)) from error
     if not isinstance(document, dict) or document.get("format") != _FORMAT:
-        raise PlanFileError(f"{file}: holds no plan that this program has written")
+        raise PlanFileError(f"{file}: contains no plan of this program")
     if document.get("format_version") != _FORMAT_VERSION:
         raise PlanFileError(f"{file}: is not a plan of format version {_FORMAT_VERSION}")
     try:
@@ -131,7 +131,7 @@ def load_plan(file: Path) -> StoredPlan:
         raise PlanFileError(f"{file}: is damaged: {error}") from error
     plan = stored.plan
     if not len(plan.angles_deg) == len(plan.speeds_deg_s) == len(plan.accelerations_deg_s2) + 1:
-        raise PlanFileError(f"{file}: is damaged: angles, speeds and accelerations do not belong together")
+        raise PlanFileError(f"{file}: is damaged: angles, speeds and accelerations are inconsistent")
     return stored
 
 
