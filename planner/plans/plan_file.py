@@ -75,7 +75,9 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -
             "angles_deg": plan.angles_deg.tolist(),
             "speeds_deg_s": plan.speeds_deg_s.tolist(),
             "accelerations_deg_s2": plan.accelerations_deg_s2.tolist(),
-            "pauses": [pause._asdict() for pause in plan.pauses],
+            "pauses": [
+                {key: value for key, value in pause._asdict().items() if value is not None} for pause in plan.pauses
+            ],
             **({"waits": [wait._asdict() for wait in plan.waits]} if plan.waits else {}),
         },
         "joints_deg": _rounded(motion.robot_deg),
