@@ -132,7 +132,7 @@ class Server:
         """Return whether clients must wait, as on any slow line."""
         if self.table.ticks_until_byte() is None:
             return False
-        waiting = self.table.status().received_queue + sum(len(arrival.data) for arrival in self._arrivals)
+        waiting = self.table.received_queue + sum(len(arrival.data) for arrival in self._arrivals)
         return waiting >= _LINE_BUFFER_BYTES or len(self._arrivals) >= _MOST_ARRIVALS
 
     def _sleep_s(self) -> float:
