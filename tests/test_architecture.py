@@ -20,7 +20,18 @@ MAY_IMPORT = {
 }
 
 ROOMS = {
-    "planner": ["geometry", "kinematics", "table", "cell", "map", "planning", "execution", "scanning", "commands"],
+    "planner": [
+        "geometry",
+        "kinematics",
+        "table",
+        "cell",
+        "map",
+        "planning",
+        "execution",
+        "scanning",
+        "adaptive",
+        "commands",
+    ],
     "emulator": ["plant", "firmware", "line", "faults", "config", "table", "ports", "server"],
     "protocol/conformance": [
         "profile",
