@@ -156,10 +156,21 @@ def _add_scan(commands: "argparse._SubParsersAction[Parser]") -> None:
     )
     parser.add_argument("--xyz", action="store_true", help="write cloud.xyz as well")
     parser.add_argument(
+        "--normals", action="store_true", help="write normals.ply as well: the cloud thinned to 0.5 mm, with normals"
+    )
+    parser.add_argument(
+        "--surface", type=Path, metavar="FILE.ply",
+        help="write a triangle mesh of the cloud, by Poisson reconstruction (extra: adaptive)",
+    )  # fmt: skip
+    parser.add_argument(
         "--seed", type=whole_number(0, 2**31), default=0, metavar="N", help="random seed of the noise (default: 0)"
     )
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for cloud.ply, scan.json and report.html"
+        "--out",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="folder for cloud.ply, poses.csv, scan.json and report.html",
     )
 
 

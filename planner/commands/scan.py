@@ -13,16 +13,20 @@ from planner.scanning.scan_report import scan_report, verdict_of
 from planner.scanning.scan_run import Scanned, ScanOptions, scan_workpiece
 from planner.set_aside import set_aside
 from protocol import TableError
+from protocol.extras import need
 from protocol.page import Origin
 from protocol.progress import progress_line
 from protocol.whole_file import write_whole
 
 _INCOMPLETE = 1
-SCAN_RESULTS = ("cloud.ply", "cloud.xyz", "scan.json", "report.html")
+SCAN_RESULTS = ("cloud.ply", "cloud.xyz", "normals.ply", "poses.csv", "scan.json", "report.html")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Scan, write cloud, figures and report, print what it came to, and return the exit status."""
+    if arguments.surface is not None:
+        need("gpytoolbox")
+        _check_surface_file(arguments.surface)
     set_aside(arguments.out, SCAN_RESULTS, keep=() if arguments.mesh is None else (arguments.mesh,))
     progress = progress_line("mesh", sys.stderr)
     scan = load_scan(arguments.scan, options.say, progress)
@@ -40,6 +44,8 @@ def run(arguments: argparse.Namespace) -> int:
         angle_count=arguments.angles,
         exact_calibration=arguments.exact_calibration,
         xyz=arguments.xyz,
+        normals=arguments.normals,
+        surface=arguments.surface,
         triggers=TriggerConditions(rate_hz=arguments.rate, seed=arguments.seed),
         seed=arguments.seed,
     )
@@ -54,6 +60,14 @@ def run(arguments: argparse.Namespace) -> int:
         raise PlannerError(f"{out}: the scan cannot be written there ({error.strerror or error})") from error
     sys.stdout.write(summary(scanned))
     return 0 if scanned.is_whole else _INCOMPLETE
+
+
+def _check_surface_file(file: Path) -> None:
+    """Refuse, before the scan, a file that could not be written after it."""
+    if file.suffix.lower() != ".ply":
+        raise PlannerError(f"{file}: a surface is written as PLY; choose a name that ends in .ply")
+    if not file.parent.is_dir():
+        raise PlannerError(f"{file}: there is no folder {file.parent}; create it, or choose another file")
 
 
 def summary(scanned: Scanned) -> str:

@@ -23,7 +23,9 @@ from planner.execution.free_way import check_ends
 from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_motion import TableMotion
 from planner.execution.table_port import CONTROL_TIMEOUT_S, open_port
+from planner.geometry.point_normals import point_normals
 from planner.geometry.ray_casting import RayCaster
+from planner.geometry.thinned_cloud import ThinnedCloud
 from planner.map.config_map import ConfigurationMap
 from planner.planning.arm_check import PlannedArm, arm_fault
 from planner.planning.plan import Plan
@@ -34,10 +36,12 @@ from planner.scanning.calibration import AxisCalibration, PartSize
 from planner.scanning.coverage import Coverage
 from planner.scanning.error_account import Account, Chain, Samples, account
 from planner.scanning.latched_run import LatchedRun, TriggerConditions, run_latched
-from planner.scanning.point_cloud import PlyWriter, XyzWriter
+from planner.scanning.point_cloud import PlyWriter, XyzWriter, write_normals
+from planner.scanning.pose_table import write_poses
 from planner.scanning.probe import LaserProbe, measure
 from planner.scanning.probe_calibration import ProbeCalibration
 from planner.scanning.reference_sphere import calibrate_cell
+from planner.scanning.surface_mesh import save_surface, surface_mesh
 from planner.scanning.trigger_line import ProbeByHand, ProbeOnPort, TriggerLine
 from planner.table.motion import Limits
 from planner.table.wire import Wire
@@ -50,6 +54,8 @@ from protocol.progress import Progress, ProgressOf
 _BLOCK = 64
 # Profiles that are nearer to one another leave no gap.
 COVERED_MM = 2.0
+# Cells of the thinned cloud, and how far the neighbors are that a normal is made from.
+_THINNED_MM, _NORMAL_MM = 0.5, 2.5
 
 
 class ScanError(PlannerError):
@@ -71,6 +77,8 @@ class ScanOptions(NamedTuple):
     angle_count: int = 360
     exact_calibration: bool = False
     xyz: bool = False
+    normals: bool = False
+    surface: Path | None = None
     probe: LaserProbe | None = None
     triggers: TriggerConditions = TriggerConditions()
     seed: int = 0
@@ -229,10 +237,26 @@ def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: Progre
         (out / "cloud.ply").unlink()
         (out / "cloud.xyz").unlink(missing_ok=True)
         raise ScanError(f"nothing was scanned: none of {len(run.numbers)} profiles meets the workpiece")
+    work.write_poses(out / "poses.csv")
+    if work.thinned is not None:
+        _write_surface(work.thinned, scan.name, options, out)
     accounted = account(chain, work.samples.all(), scan.mesh, 10.0**-options.decimals)
     return Scanned(
         scan, options, probe, planned, knowledge, run, ply.count, work.coverage, accounted, not came_to_its_end
     )
+
+
+def _write_surface(cloud: ThinnedCloud, name: str, options: ScanOptions, out: Path) -> None:
+    """Write the thinned cloud with its normals, and the surface through it, as far as they were asked for."""
+    points = cloud.points
+    found = point_normals(points, cloud.beams, _NORMAL_MM)
+    if options.normals:
+        comment = f"seventh-axis scan {name}, seed {options.seed}, mean points of cells of {cloud.cell_mm:g} mm"
+        write_normals(out / "normals.ply", points[found.is_known], found.normals[found.is_known], comment)
+    if options.surface is not None:
+        save_surface(
+            options.surface, surface_mesh(points[found.is_known], found.normals[found.is_known], cloud.cell_mm)
+        )
 
 
 class _Measuring:
@@ -240,6 +264,8 @@ class _Measuring:
 
     def __init__(self, mesh: trimesh.Trimesh, probe: LaserProbe, chain: Chain, options: ScanOptions) -> None:
         self.samples = Samples()
+        asked = options.normals or options.surface is not None
+        self.thinned = ThinnedCloud(_THINNED_MM) if asked else None
         caster = RayCaster(mesh)
         self.coverage = Coverage(mesh, caster, probe, COVERED_MM)
         self._caster, self._probe, self._chain, self._seed = caster, probe, chain, options.seed
@@ -258,6 +284,12 @@ class _Measuring:
             return False
         return True
 
+    def write_poses(self, file: Path) -> None:
+        """Write the latched pose of every profile."""
+        run, chain = self._chain.run, self._chain
+        T_BF = chain.flange_poses(run.joints_deg)
+        write_poses(file, run.numbers, run.times_s, run.angles_deg, run.joints_deg, T_BF, self._known_poses())
+
     def _known_poses(self) -> FloatArray:
         """Return T_WS `(n, 4, 4)` from what was latched and calibrated alone."""
         run, chain = self._chain.run, self._chain
@@ -273,5 +305,7 @@ class _Measuring:
         ply.write(points, beams, numbers[seen.profiles])
         if xyz is not None:
             xyz.write(points)
+        if self.thinned is not None:
+            self.thinned.take(points, beams)
         self.samples.take(first, seen)
         self.coverage.take(true_T_WS)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from planner.scanning.point_cloud import PlyWriter, XyzWriter
+from planner.scanning.point_cloud import PlyWriter, XyzWriter, write_normals
 
 POINTS = np.random.default_rng(0).uniform(-300.0, 300.0, (1000, 3))
 BEAMS = POINTS / np.linalg.norm(POINTS, axis=1, keepdims=True)
@@ -75,3 +75,12 @@ def test_text_keeps_a_tenth_of_a_micrometre(tmp_path: Path) -> None:
         xyz.write(POINTS[600:])
         xyz.write(POINTS[:0])
     assert np.abs(np.loadtxt(tmp_path / "cloud.xyz") - POINTS).max() <= 0.5e-4 + 1e-9
+
+
+def test_another_program_reads_the_normals(tmp_path: Path) -> None:
+    write_normals(tmp_path / "normals.ply", POINTS, BEAMS, "two\nlines")
+    rows = properties(tmp_path / "normals.ply")
+    assert np.abs(np.column_stack([rows[f"n{axis}"] for axis in "xyz"]) - BEAMS).max() < 1e-6
+    cloud = trimesh.load(tmp_path / "normals.ply")
+    assert isinstance(cloud, trimesh.PointCloud)
+    assert np.abs(np.asarray(cloud.vertices) - POINTS).max() < 2e-5
