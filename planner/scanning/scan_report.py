@@ -8,10 +8,11 @@ from planner.scanning.calibration import AxisCalibration
 from planner.scanning.coverage import REASONS
 from planner.scanning.deviation_plots import deviation_figure
 from planner.scanning.error_account import Account, Contribution
+from planner.scanning.measuring import COVERED_MM
 from planner.scanning.probe import Sight
 from planner.scanning.probe_calibration import ProbeCalibration
 from planner.scanning.scan_plots import STATE_NAMES, account_figure, coverage_figure
-from planner.scanning.scan_run import COVERED_MM, Scanned
+from planner.scanning.scan_run import Scanned
 from protocol.page import Origin, counted, figure, heading, page, paragraph, table, verdict
 
 _MICROMETRES = 1e3
