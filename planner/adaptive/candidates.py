@@ -5,6 +5,8 @@ are thinned to a few that lie far apart. A strip runs through its place, straigh
 stand-off is kept; what an obstacle or the arm forbids of it is cut off (`reach`).
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from planner.adaptive.visibility import Places
@@ -15,6 +17,10 @@ from planner.geometry.ray_casting import RayCaster
 
 POSES = 5
 """Poses of a strip."""
+SHORTEST_MM = 60.0
+"""Length of the strips over small parts."""
+ROLLS_DEG = (0.0, 90.0)
+"""How far the laser line is turned about the beam from the level."""
 # Directions that are tried, evenly spread over the sphere, and how far off the normal a beam may be.
 _DIRECTIONS = 128
 _LEAST_COSINE = np.cos(np.radians(58.0))
@@ -98,7 +104,7 @@ def following(caster: RayCaster, strips: FloatArray, probe: Probe) -> tuple[Floa
     across = np.linspace(-0.3, 0.3, 5)[:, np.newaxis] * probe.line_width_mm
     origins = strips[:, :, np.newaxis, :3, 3] + across * strips[:, :, np.newaxis, :3, 0]
     beams = np.repeat(strips[:, :, :3, 2].reshape(-1, 3), len(across), axis=0)
-    depths_mm = caster.first_hits(origins.reshape(-1, 3), beams).distances_mm.reshape(n, k, -1)
+    depths_mm = caster.first_hits(origins.reshape(-1, 3), beams).distances_mm.reshape(n, k, len(across))
     in_range = (depths_mm >= probe.nearest_mm) & (depths_mm <= probe.farthest_mm)
     nearest_mm = np.where(in_range, depths_mm, np.inf).min(axis=2)
     shift_mm = np.where(np.isfinite(nearest_mm), nearest_mm - probe.stand_off_mm, 0.0)
@@ -110,3 +116,39 @@ def following(caster: RayCaster, strips: FloatArray, probe: Probe) -> tuple[Floa
     moved = strips.copy()
     moved[:, :, :3, 3] += shift_mm[:, :, np.newaxis] * strips[:, :, :3, 2]
     return moved, np.asarray(np.abs(shift_mm).max(axis=1) > _MOVED_MM)
+
+
+def candidate_sweeps(
+    caster: RayCaster,
+    places: Places,
+    targets: int,
+    most_directions: int,
+    longest_mm: float,
+    probe: Probe,
+    is_reached: Callable[[FloatArray], BoolArray],
+) -> FloatArray:
+    """Return candidate strips over places `(n, POSES, 4, 4)`: each straight, and following the surface where it bends.
+
+    Args:
+        caster: The surface.
+        places: Where something is to be seen.
+        targets: Over how many of the places strips are laid; these are spread.
+        most_directions: From how many directions each is looked at; those that are reached are spread.
+        longest_mm: The part's longest side, which strips are half as long as.
+        probe: The probe.
+        is_reached: Tells for poses `(m, 4, 4)` which of them the arm can reach at any table angle, `(m,)`.
+    """
+    chosen = places.only(spread(places.points, targets))
+    number, ways = directions(caster, chosen, probe.stand_off_mm)
+    length_mm = max(SHORTEST_MM, 0.5 * longest_mm)
+    rolled = np.stack(
+        [sweeps(chosen.points[number], ways, np.full(len(ways), roll), length_mm, probe) for roll in ROLLS_DEG]
+    )
+    reached = is_reached(rolled[:, :, POSES // 2].reshape(-1, 4, 4)).reshape(len(ROLLS_DEG), -1)
+    kept = np.zeros(len(ways), dtype=np.bool_)
+    for target in np.unique(number[reached.any(axis=0)]):
+        own = np.flatnonzero((number == target) & reached.any(axis=0))
+        kept[own[spread(ways[own], most_directions)]] = True
+    straight = rolled[reached & kept]
+    bent, moved = following(caster, straight, probe)
+    return np.concatenate((straight, bent[moved]))

@@ -9,6 +9,11 @@ from typing import NamedTuple, Protocol
 from planner.adaptive.policy import Policy, PolicyError, Returned
 from planner.adaptive.strip import Strip
 from planner.cell.obstacles import Obstacle
+from planner.errors import PlannerError
+
+
+class CarrierError(PlannerError):
+    """Table or probe cannot go on: the session ends, and what was scanned is kept."""
 
 
 class Carrier(Protocol):
@@ -19,7 +24,11 @@ class Carrier(Protocol):
         ...
 
     def scan(self, strip: Strip, solid: Obstacle) -> Returned | str:
-        """Scan one strip past something solid, and return what the probe returned, or why it cannot be scanned."""
+        """Scan one strip past something solid, and return what the probe returned, or why it cannot be scanned.
+
+        Raises:
+            CarrierError: Something failed that will not be better with the next strip.
+        """
         ...
 
 
@@ -41,14 +50,20 @@ class Session(NamedTuple):
     Attributes:
         steps: Its strips, in the order in which they were scanned.
         failure: Why it ended early; None when the policy wanted no more strips, or the most were scanned.
+        contradicts: Whether it ended because what was seen contradicts what the policy was made with.
     """
 
     steps: tuple[Step, ...]
     failure: str | None = None
+    contradicts: bool = False
 
 
 def run_session(
-    policy: Policy, carrier: Carrier, most_strips: int, say: Callable[[int, str], None] = lambda _number, _state: None
+    policy: Policy,
+    carrier: Carrier,
+    most_strips: int,
+    say: Callable[[int, str], None] = lambda _number, _state: None,
+    scan_path: Callable[[], Returned] | None = None,
 ) -> Session:
     """Run a session; Ctrl-C and a policy that cannot go on end it, and what was scanned is kept.
 
@@ -57,13 +72,18 @@ def run_session(
         carrier: What scans them.
         most_strips: How many strips are scanned at most.
         say: Called with the number of strips scanned and the policy's state, at the start and after each.
+        scan_path: Scans the predefined path, where there is one.
     """
     steps: list[Step] = []
     try:
+        if scan_path is not None:
+            policy.take(None, scan_path())
         _scan_all(policy, carrier, most_strips, say, steps)
     except KeyboardInterrupt:
         return Session(tuple(steps), "interrupted")
     except PolicyError as error:
+        return Session(tuple(steps), str(error), contradicts=True)
+    except CarrierError as error:
         return Session(tuple(steps), str(error))
     return Session(tuple(steps))
 

@@ -18,6 +18,7 @@ from planner.planning.arm_motion import arm_motion
 from planner.planning.arm_on_path import arm_along
 from planner.planning.plan import NoPlan, Plan, Planner
 from planner.planning.problem import Problem
+from planner.scanning.scan_run import Planned
 
 # Where the arm cannot follow at the strip's own speed, it may be swept this much slower.
 _SLOWER = (1.0, 2.0, 4.0)
@@ -45,9 +46,14 @@ class StripPlan:
         return Configuration.parse(self.plan.configuration)
 
     @property
+    def planned(self) -> Planned:
+        """The same as the plan of any scan."""
+        return Planned(self.plan, self.joints_deg, self.problem.limits, self.problem.map)
+
+    @property
     def motion(self) -> TableMotion:
         """What the table does."""
-        return TableMotion(self.plan, self.problem.limits)
+        return self.planned.motion
 
     def turned(self, turns: int) -> "StripPlan":
         """Return the same, full turns of the table farther."""
