@@ -44,6 +44,10 @@ TOLERANCE_DEG = 0.25
 RUN_ON_DEG = 90.0
 """How far the table may run on when the line dies."""
 PROFILES_HZ = 25.0
+SHARE_SEEN = 0.99
+"""Share of what can be seen that an adaptive scan sees."""
+MOST_STRIPS = 200
+"""How many strips an adaptive scan has at most."""
 
 
 def shipped_scans() -> list[str]:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from planner.adaptive.known_part import KnownPart
 from planner.adaptive.policy import Returned
 from planner.adaptive.session import Session, run_session
@@ -12,9 +14,10 @@ from planner.adaptive.surroundings import Surroundings
 from planner.adaptive.table_carrier import ScannedStrip, TableCarrier
 from planner.adaptive.transfer import Transfer
 from planner.adaptive.unseen_regions import Region, unseen_regions
-from planner.arrays import BoolArray
+from planner.arrays import BoolArray, IndexArray
 from planner.cell.obstacles import workpiece_obstacle
 from planner.cell.scan import Scan
+from planner.defaults import MOST_STRIPS, SHARE_SEEN
 from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.scanning.latched_run import LatchedRun, joined, number_after, numbered_from
 from planner.scanning.measuring import COVERED_MM, Measuring
@@ -50,8 +53,8 @@ class AdaptOptions(NamedTuple):
         most_strips: How many strips are scanned at most.
     """
 
-    share: float = 0.99
-    most_strips: int = 200
+    share: float = SHARE_SEEN
+    most_strips: int = MOST_STRIPS
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +69,7 @@ class AdaptiveScanned:
         draws_back: The way to a clear posture at the end.
         wanted: The share of what can be seen that was wanted.
         visible: `(m,)` which places of the coverage can be seen.
-        seen_after: How many places were seen after the path, and after each strip.
+        first_seen: `(m,)` the motion that saw each place first, counted from 0, the path included; -1 for none.
         regions: What was not seen.
     """
 
@@ -77,13 +80,20 @@ class AdaptiveScanned:
     draws_back: Transfer | None
     wanted: float
     visible: BoolArray
-    seen_after: tuple[int, ...]
+    first_seen: IndexArray
     regions: list[Region]
 
     @property
     def places(self) -> int:
         """How many places the surface is known by."""
         return len(self.visible)
+
+    @property
+    def seen_after(self) -> list[int]:
+        """How many places were seen after each motion, the path included."""
+        motions = len(self.strips) + (self.path is not None)
+        new = np.bincount(self.first_seen[self.first_seen >= 0], minlength=motions)
+        return [int(seen) for seen in np.cumsum(new)]
 
     @property
     def share_of_whole(self) -> float:
@@ -124,7 +134,10 @@ class _Cloud:
     xyz: XyzWriter | None
     runs: list[LatchedRun] = field(default_factory=list)
     dead_lines: list[DeadLine] = field(default_factory=list)
-    seen_after: list[int] = field(default_factory=list)
+    first_seen: IndexArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.first_seen = np.full(len(self.work.coverage.codes), -1, dtype=np.int64)
 
     def take(self, planned: Planned, run: LatchedRun) -> Returned:
         """Measure, align and write a run."""
@@ -132,7 +145,8 @@ class _Cloud:
         self.runs.append(numbered_from(run, first))
         self.dead_lines.append(judge_dead_line(planned.map, planned.motion, run.record))
         measured = self.work.take(chain_of(self.scan, self.knowledge, self.runs[-1]), self.ply, self.xyz, None)
-        self.seen_after.append(int((self.work.coverage.codes == Sight.SEEN).sum()))
+        is_new = (self.work.coverage.codes == Sight.SEEN) & (self.first_seen < 0)
+        self.first_seen[is_new] = len(self.runs) - 1
         if not measured.is_whole:
             raise KeyboardInterrupt
         return Returned(measured.T_WS, measured.profiles, measured.points_W)
@@ -196,7 +210,7 @@ def scan_adaptively(
     visible = policy.visible | (work.coverage.codes == Sight.SEEN)
     regions = unseen_regions(work.coverage, visible, float(scan.mesh.area))
     return AdaptiveScanned(
-        scanned, session, tuple(carrier.scanned), path, draws_back, adapt.share, visible, tuple(cloud.seen_after),
+        scanned, session, tuple(carrier.scanned), path, draws_back, adapt.share, visible, cloud.first_seen,
         regions,
     )  # fmt: skip
 

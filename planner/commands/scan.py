@@ -4,8 +4,11 @@ import argparse
 import sys
 from pathlib import Path
 
-from planner.cell.scan import load_scan, with_mesh
+from planner.adaptive.adaptive_report import adaptive_document, adaptive_report, adaptive_summary
+from planner.adaptive.adaptive_scan import AdaptOptions, scan_adaptively
+from planner.cell.scan import Scan, load_scan, with_mesh
 from planner.commands import options
+from planner.defaults import SHARE_SEEN
 from planner.errors import PlannerError
 from planner.scanning.latched_run import TriggerConditions
 from planner.scanning.scan_file import save_scan, scan_document
@@ -15,7 +18,7 @@ from planner.set_aside import set_aside
 from protocol import TableError
 from protocol.extras import need
 from protocol.page import Origin
-from protocol.progress import progress_line
+from protocol.progress import progress_line, show_line
 from protocol.whole_file import write_whole
 
 _INCOMPLETE = 1
@@ -29,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
         _check_surface_file(arguments.surface)
     set_aside(arguments.out, SCAN_RESULTS, keep=() if arguments.mesh is None else (arguments.mesh,))
     progress = progress_line("mesh", sys.stderr)
-    scan = load_scan(arguments.scan, options.say, progress)
+    scan = known = load_scan(arguments.scan, options.say, progress)
     if arguments.mesh is not None:
         scan = with_mesh(scan, arguments.mesh, arguments.unit, options.say, progress)
     asked = ScanOptions(
@@ -51,6 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
     )
     out: Path = arguments.out
     try:
+        if arguments.adapt is not None or not scan.has_path:
+            return _adaptive(scan, known, asked, arguments)
         scanned = scan_workpiece(scan, asked, out, lambda label: progress_line(label, sys.stderr))
         save_scan(out / "scan.json", scan_document(scanned))
         write_whole(out / "report.html", scan_report(scanned, Origin(arguments.command_line)))
@@ -60,6 +65,26 @@ def run(arguments: argparse.Namespace) -> int:
         raise PlannerError(f"{out}: the scan cannot be written there ({error.strerror or error})") from error
     sys.stdout.write(summary(scanned))
     return 0 if scanned.is_whole else _INCOMPLETE
+
+
+def _adaptive(scan: Scan, known: Scan, asked: ScanOptions, arguments: argparse.Namespace) -> int:
+    """Scan adaptively; `known` has the mesh that the strips are chosen by. Return the exit status."""
+    out: Path = arguments.out
+    wanted = AdaptOptions(SHARE_SEEN if arguments.adapt is None else arguments.adapt, arguments.most_strips)
+    found = scan_adaptively(
+        scan, asked, wanted, out, lambda label: progress_line(label, sys.stderr), _show_strips, known
+    )
+    show_line("", sys.stderr)
+    save_scan(out / "scan.json", scan_document(found.scanned) | {"adaptive": adaptive_document(found)})
+    write_whole(out / "report.html", adaptive_report(found, Origin(arguments.command_line)))
+    sys.stdout.write(summary(found.scanned) + adaptive_summary(found))
+    if found.session.contradicts:
+        raise PlannerError(f"{found.session.failure}; what was scanned is in {out}")
+    return 0 if found.has_succeeded else _INCOMPLETE
+
+
+def _show_strips(number: int, state: str) -> None:
+    show_line(f"strip {number}: {state}", sys.stderr)
 
 
 def _check_surface_file(file: Path) -> None:

@@ -20,10 +20,18 @@ _MICROMETRES = 1e3
 
 def scan_report(scanned: Scanned, origin: Origin | None = None) -> str:
     """Return the page of a scan."""
-    mesh, accounted = scanned.scan.mesh, scanned.account
     blocks = (
         verdict(verdict_of(scanned), scanned.is_whole),
         table(("", ""), list(_summary(scanned)), words=True),
+        *scan_blocks(scanned),
+    )
+    return page(f"Scan of {scanned.scan.name}", blocks, origin)
+
+
+def scan_blocks(scanned: Scanned) -> tuple[str, ...]:
+    """Return the parts of the page that tell of the cloud, its errors, coverage, calibration and profiles."""
+    mesh, accounted = scanned.scan.mesh, scanned.account
+    return (
         heading("The cloud"),
         paragraph("Color is how far the cloud lies from the surface, averaged nearby; gray was not measured."),
         figure(
@@ -51,7 +59,6 @@ def scan_report(scanned: Scanned, origin: Origin | None = None) -> str:
         heading("Profiles"),
         table(("", ""), list(_profiles(scanned))),
     )
-    return page(f"Scan of {scanned.scan.name}", blocks, origin)
 
 
 def verdict_of(scanned: Scanned) -> str:
