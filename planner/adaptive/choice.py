@@ -60,7 +60,7 @@ def exchange(sees: BoolArray, chosen: Sequence[int], wanted: int) -> list[int]:
     """Return at most as many strips that see no less, or at least `wanted` places, after exchanges."""
     table = np.asarray(sees, dtype=np.float32)
     best = list(chosen)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MOST_ROUNDS if best else 0):
         better = _without_one(sees, best, wanted) or _one_for_two(table, best, wanted) or _one_for_one(table, best)
         if better is None:
             break

@@ -1,7 +1,7 @@
 """The order of strips that takes the least time: an open tour in which each strip may be swept from either end.
 
-From the end of one strip to the beginning of the next, the slower of table and arm decides. The tour begins at the
-strip nearest to the start and goes on to the nearest; then parts of it are reversed (2-opt) or moved (Or-opt) while
+From the end of one strip to the beginning of the next, the slower of table and arm decides. The tour begins at a
+strip near the start and goes on to the nearest; then parts of it are reversed (2-opt) or moved (Or-opt) while
 that saves time. A part that is reversed has its strips swept the other way.
 """
 
@@ -16,6 +16,8 @@ from planner.arrays import FloatArray, IndexArray
 # Less than this is not worth another round, in s.
 _SAVES_S = 1e-9
 _LONGEST_MOVED = 3
+# Beginnings that are tried, times sweeps.
+_WORK = 200
 
 
 class Visit(NamedTuple):
@@ -57,16 +59,29 @@ def travel_times(ends_s: FloatArray, from_start_s: FloatArray) -> TravelTimes:
 
 
 def best_tour(times: TravelTimes) -> list[Visit]:
-    """Return a tour of all strips that no reversal of a part and no move of a short part makes shorter."""
-    tour = _nearest_first(times)
-    least_s = float(times.tours_s(np.array([tour]))[0]) if tour else 0.0
+    """Return a tour of all strips that no reversal of a part and no move of a short part makes shorter.
+
+    Of several such tours, which begin with different strips, the shortest.
+    """
+    count = len(times.from_start_s)
+    begins = np.argsort(times.from_start_s, kind="stable")[: max(1, _WORK // max(1, count))]
+    tours = [_improved(times, _nearest_first(times, int(begin))) for begin in begins]
+    if not tours:
+        return []
+    tour = tours[int(np.argmin(times.tours_s(np.array(tours))))]
+    return [Visit(sweep // 2, sweep % 2 == 1) for sweep in tour]
+
+
+def _improved(times: TravelTimes, tour: list[int]) -> list[int]:
+    """Return a tour of sweeps that no change makes shorter."""
+    least_s = float(times.tours_s(np.array([tour]))[0])
     while changed := list(_changed(tour)):
         tours_s = times.tours_s(np.array(changed))
         best = int(np.argmin(tours_s))
         if tours_s[best] > least_s - _SAVES_S:
             break
         tour, least_s = changed[best], float(tours_s[best])
-    return [Visit(sweep // 2, sweep % 2 == 1) for sweep in tour]
+    return tour
 
 
 def tour_s(times: TravelTimes, tour: list[Visit]) -> float:
@@ -76,13 +91,13 @@ def tour_s(times: TravelTimes, tour: list[Visit]) -> float:
     return sum(ways_s, float(times.from_start_s[sweeps[0]]) if sweeps else 0.0)
 
 
-def _nearest_first(times: TravelTimes) -> list[int]:
-    """Return the tour of sweeps that goes on to the nearest each time."""
+def _nearest_first(times: TravelTimes, begin: int) -> list[int]:
+    """Return the tour of sweeps that begins with one and goes on to the nearest each time."""
     left = np.ones(len(times.from_start_s), dtype=np.bool_)
-    tour: list[int] = []
+    tour = [begin]
+    left[[begin, begin ^ 1]] = False
     while left.any():
-        ways_s = times.between_s[tour[-1]] if tour else times.from_start_s
-        nearest = int(np.argmin(np.where(left, ways_s, np.inf)))
+        nearest = int(np.argmin(np.where(left, times.between_s[tour[-1]], np.inf)))
         tour.append(nearest)
         left[[nearest, nearest ^ 1]] = False
     return tour
