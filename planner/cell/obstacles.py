@@ -33,6 +33,7 @@ class Obstacle(NamedTuple):
         pose: `(4, 4)`, the shape's frame in the table's (for one that turns with it) or in the base's.
         turning: Whether it turns with the table.
         field: The field, for that kind.
+        stops_light: Whether the beam must not pass it. Space that nobody has seen is solid for the arm alone.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Obstacle(NamedTuple):
     pose: FloatArray
     turning: bool
     field: SignedDistanceField | None = None
+    stops_light: bool = True
 
 
 def box(name: str, lengths_mm: tuple[float, float, float], pose: FloatArray, *, turning: bool) -> Obstacle:
