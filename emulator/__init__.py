@@ -8,8 +8,7 @@ import protocol.quiet_start  # noqa: F401 - before the imports that take long
 # isort: split
 import serial
 
-from emulator.config.table_config import TableConfig, load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, TableConfig, load_config
 from emulator.table.table import Table
 from protocol.bench import TableStatus
 

@@ -10,9 +10,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from emulator.config.table_config import TableConfig, load_config
-from emulator.config.toml_section import ConfigError
-from emulator.faults.parameter import brief
+from emulator.avr.errors import ChipError, ToolchainError
+from emulator.config.table_config import ConfigError, TableConfig, load_config
 from emulator.ports.port import Port
 from emulator.ports.tcp_port import TcpPort, parse_address
 from emulator.server.clock import TIME_SCALE, Clock
@@ -21,6 +20,7 @@ from emulator.server.signals import SignalWatch
 from emulator.table.table import Table
 from emulator.trace import TraceError, TraceWriter
 from protocol.command_line import Parser, program_name
+from protocol.data_file import shown
 
 _EXAMPLE = """example:
   python -m emulator --pty --link ./table &
@@ -33,6 +33,7 @@ trigger; Ctrl-C or SIGTERM end the emulator with status 0.
 _MOST_DIGITS = 30
 
 if TYPE_CHECKING:
+    from emulator.avr.compiled_table import AnyTable
     from emulator.server.control_socket import ControlSocket
 
 
@@ -54,6 +55,9 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     except TraceError as error:
         _say(f"--trace {error}")
+        return 2
+    except ChipError as error:
+        _say(f"--firmware: {error}")
         return 2
     except OSError as error:
         _say(f"cannot go on: {error}; see that stdout is read")
@@ -88,6 +92,11 @@ def parser() -> Parser:
     add("--decimals", metavar="N", type=int, help="decimal places of angles in replies (default: 1)")
     add("--strict-table1", action="store_true", help="no error replies: the protocol as in Table 1 of the paper")
     add("--config", metavar="FILE", type=Path, help="TOML file with overrides of the default constants")
+    add(
+        "--firmware",
+        metavar="avr|ELF",
+        help="compiled firmware in simavr: avr builds it, or an .elf file (default: the emulator's own)",
+    )
     add("--trigger-hz", metavar="F", type=_rate, default=0.0, help="rate of the probe's trigger (default: 0, none)")
     add("--control", metavar="PATH", type=Path, help="path of the Unix socket for python -m emulator.control_client")
     add("--trace", metavar="FILE", type=Path, help="record every tick in a .csv or .npz file")
@@ -115,14 +124,14 @@ def _rate(text: str) -> float:
     except ValueError:
         value = math.nan
     if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"{brief(text)} is not a number from 0 up")
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not a number from 0 up")
     return value
 
 
 def _seed(text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS):
         raise argparse.ArgumentTypeError(
-            f"{brief(text)} is not a whole number from 0 up, of at most {_MOST_DIGITS} digits"
+            f"{shown(text)} is not a whole number from 0 up, of at most {_MOST_DIGITS} digits"
         )
     return int(text)
 
@@ -130,8 +139,7 @@ def _seed(text: str) -> int:
 def _serve(options: argparse.Namespace, config: TableConfig, stack: ExitStack) -> None:
     """Open what was asked for, publish the ports, and serve; `stack` closes all of it in the reverse order."""
     signals = stack.enter_context(SignalWatch(*SERVED_SIGNALS))
-    with _usage("--config"):
-        table = Table(config, seed=options.seed)
+    table = _table(options, config)
     with _usage("--trigger-hz"):
         table.trigger_hz = options.trigger_hz
     ports = _open_ports(options, config, stack)
@@ -145,6 +153,20 @@ def _serve(options: argparse.Namespace, config: TableConfig, stack: ExitStack) -
         print(port.name, flush=True)
     _say(f"the table is ready ({rate}); Ctrl-C ends it")
     server.run()
+
+
+def _table(options: argparse.Namespace, config: TableConfig) -> "AnyTable":
+    if options.firmware is None:
+        with _usage("--config"):
+            return Table(config, seed=options.seed)
+    # Here, since only this table needs compilers and simavr.
+    from emulator.avr.compiled_table import CompiledTable  # noqa: PLC0415  # see above
+
+    try:
+        with _usage("--firmware"):
+            return CompiledTable(config, options.seed, None if options.firmware == "avr" else Path(options.firmware))
+    except ToolchainError as error:
+        raise UsageError(f"--firmware {options.firmware}: {error}") from error
 
 
 def _open_ports(options: argparse.Namespace, config: TableConfig, stack: ExitStack) -> list[Port]:
@@ -198,7 +220,7 @@ def _open_control(path: Path, stack: ExitStack) -> "ControlSocket":
     return control
 
 
-def _start_trace(path: Path, table: Table, config: TableConfig, stack: ExitStack) -> None:
+def _start_trace(path: Path, table: "AnyTable", config: TableConfig, stack: ExitStack) -> None:
     table.observer = stack.enter_context(TraceWriter(path, config.control.tick_hz)).record
 
 

@@ -9,6 +9,7 @@ from emulator.server.control_commands import COMMANDS
 from protocol.bench import BenchError
 from protocol.command_line import Parser, program_name
 from protocol.control_channel import request
+from protocol.ending import ended
 
 __all__ = ["main", "request"]
 
@@ -22,13 +23,13 @@ _EXAMPLE = """example:
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     parsed = parser().parse_args(arguments)
+    return ended("control_client", lambda: _request(parsed), BenchError)
+
+
+def _request(parsed: argparse.Namespace) -> int:
     given = {parameter.name: getattr(parsed, parameter.name) for parameter in COMMANDS[parsed.command].parameters}
     parameters = {name: value for name, value in given.items() if value is not None}
-    try:
-        result = request(parsed.path, parsed.command, **parameters)
-    except BenchError as error:
-        sys.stderr.write(f"control_client: {error}\n")
-        return 2
+    result = request(parsed.path, parsed.command, **parameters)
     if result:
         sys.stdout.write(json.dumps(result, indent=2) + "\n")
     return 0

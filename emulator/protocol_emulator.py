@@ -6,6 +6,7 @@ the bytes are there or the time-out is over, `flush` until all is sent, `clock.s
 """
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 from urllib.parse import parse_qsl, urlsplit
@@ -13,8 +14,7 @@ from urllib.parse import parse_qsl, urlsplit
 import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException, SerialTimeoutException
 
-from emulator.config.table_config import TableConfig, load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, TableConfig, load_config
 from emulator.line.framing import rates_agree, read_at_rate
 from emulator.table.fast_ticks import FastTicks
 from emulator.table.table import Table
@@ -22,14 +22,27 @@ from emulator.table.table import Table
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
+    from emulator.avr.compiled_table import AnyTable
+
 OUTPUT_BYTES: Final = 4096
 """What a write leaves to wait for the line, as the driver of a real port does, before it waits itself."""
 
 RUN: Final = FastTicks()
 """What passes the time of all tables of this process: compiled, once that pays."""
 
-_URL = "emulator://[?config=PATH&seed=N&baud=N&decimals=N&strict=0|1&trigger_hz=F]"
+_FORMS = {
+    "config": "config=PATH",
+    "firmware": "firmware=ELF",
+    "seed": "seed=N",
+    "baud": "baud=N",
+    "decimals": "decimals=N",
+    "strict": "strict=0|1",
+    "trigger_hz": "trigger_hz=F",
+}
 _OPTIONS = ("config", "seed", "baud", "decimals", "strict", "trigger_hz")
+
+SwitchOn = Callable[[TableConfig, int, Mapping[str, str]], "AnyTable"]
+"""Makes a table of its configuration, its seed and the options of a URL."""
 
 
 class VirtualClock:
@@ -57,8 +70,13 @@ class Serial(SerialBase):
         clock: its time.
     """
 
-    table: Table
+    table: "AnyTable"
     clock: VirtualClock
+
+    @staticmethod
+    def _switched_on(url: str) -> "AnyTable":
+        """Return the table that a URL describes."""
+        return table_of(url, "emulator", _OPTIONS, lambda config, seed, _: Table(config, seed, run=RUN))
 
     def open(self) -> None:
         """Switch the table on at the first opening, and connect to it.
@@ -71,7 +89,7 @@ class Serial(SerialBase):
         if self.port is None:
             raise SerialException("Port must be configured before it can be used.")
         if getattr(self, "_table_url", None) != self.port:
-            self.table = _table_of(self.port)
+            self.table = self._switched_on(self.port)
             self.clock = VirtualClock(self)
             self._table_url = self.port
         self._require_line()
@@ -262,22 +280,33 @@ class Serial(SerialBase):
         return read_at_rate(data, sender_baud, receiver_baud) if paced else data
 
 
-def _table_of(url: str) -> Table:
-    """Return the table that a URL describes."""
+def table_of(url: str, scheme: str, options: Sequence[str], switch_on: SwitchOn) -> "AnyTable":
+    """Return the table that a URL describes.
+
+    Args:
+        url: such as `emulator://?seed=7`.
+        scheme: the only one that is accepted.
+        options: the names of those that are known.
+        switch_on: makes a table of configuration, seed and the options given.
+
+    Raises:
+        SerialException: the URL has another form, or there is no such table.
+    """
+    form = f"{scheme}://[?{'&'.join(_FORMS[name] for name in options)}]"
     try:
         parts = urlsplit(url)
     except ValueError as error:
-        raise SerialException(f"{url}: {error}; the form is {_URL}") from error
-    options = dict(parse_qsl(parts.query, keep_blank_values=True))
-    if parts.scheme != "emulator" or parts.netloc or parts.path not in {"", "/"} or not set(options) <= set(_OPTIONS):
-        raise SerialException(f"{url} is not {_URL}")
+        raise SerialException(f"{url}: {error}; the form is {form}") from error
+    given = dict(parse_qsl(parts.query, keep_blank_values=True))
+    if parts.scheme != scheme or parts.netloc or parts.path not in {"", "/"} or not set(given) <= set(options):
+        raise SerialException(f"{url} is not {form}")
     try:
-        table = Table(_config_of(options), seed=int(options.get("seed", "0")), run=RUN)
-        table.trigger_hz = float(options.get("trigger_hz", "0"))
+        table = switch_on(_config_of(given), int(given.get("seed", "0")), given)
+        table.trigger_hz = float(given.get("trigger_hz", "0"))
     except ConfigError as error:
         raise SerialException(f"{url}: {error}") from error
     except ValueError as error:
-        raise SerialException(f"{url}: {error}; the form is {_URL}") from error
+        raise SerialException(f"{url}: {error}; the form is {form}") from error
     return table
 
 

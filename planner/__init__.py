@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from planner.api import PlannedScan, build_maps, plan, run, with_factors
+    from planner.api import build_maps, plan, run, with_factors
     from planner.cell.scan import Scan, load_scan
     from planner.errors import PlannerError
     from planner.execution.run import RunOptions
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from planner.map.config_map import ConfigurationMap
     from planner.planning.plan import Infeasibility, NoPlan, Plan, make_plan
     from planner.planning.problem import Problem
+    from planner.planning.scan_planning import PlannedScan
 
 _HOME = {
     "Configuration": "planner.kinematics.configuration",
@@ -30,7 +31,7 @@ _HOME = {
     "Infeasibility": "planner.planning.plan",
     "NoPlan": "planner.planning.plan",
     "Plan": "planner.planning.plan",
-    "PlannedScan": "planner.api",
+    "PlannedScan": "planner.planning.scan_planning",
     "PlannerError": "planner.errors",
     "Problem": "planner.planning.problem",
     "RatedPoses": "planner.kinematics.value",

@@ -1,68 +1,22 @@
 """What programs use of the planner, from a scan to maps, to a plan, to a verified run; see `import planner`."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from planner.cell.scan import Scan
 from planner.defaults import DEFAULT_PLANNER
 from planner.execution.run import Finished, RunOptions, run_plan
-from planner.execution.run_file import PLAN_FILE
 from planner.kinematics.configuration import Configuration
 from planner.kinematics.value import UserFactor
 from planner.map.config_map import ConfigurationMap
 from planner.map.map_builder import build_maps as maps_of
-from planner.map.map_file import MAP_FILE, save_maps
 from planner.map.map_problem import map_problem
-from planner.planning.arm_motion import ArmMotion
 from planner.planning.own_planners import checked, planner_named
-from planner.planning.plan import NoPlan, Outcome, Plan, Planner
-from planner.planning.plan_file import plan_document, save_plan
+from planner.planning.plan import NoPlan, Outcome, Planner
 from planner.planning.problem import Problem
-from planner.planning.scan_planning import plan_scan
-from planner.planning.verification import Verification, verify
-
-
-@dataclass(frozen=True, eq=False)
-class PlannedScan:
-    """A scan with the plan of its best arm configuration.
-
-    Attributes:
-        scan: What is scanned.
-        problem: Map, limits and weights of that configuration.
-        plan: The table's motion.
-        arm: The arm's motion that belongs to it.
-        outcomes: What the planner answered in each configuration, by name.
-    """
-
-    scan: Scan
-    problem: Problem
-    plan: Plan
-    arm: ArmMotion
-    outcomes: dict[str, Outcome]
-
-    @property
-    def verification(self) -> Verification:
-        """What the execution of the plan would meet."""
-        return verify(self.problem, self.plan)
-
-    @property
-    def is_executable(self) -> bool:
-        """Whether the table can carry the plan out, nothing forbidden is met, and the arm can follow."""
-        return self.verification.is_executable and self.arm.step is None
-
-    def save(self, folder: str | Path) -> Path:
-        """Write `plan.json` and `map.npz` into a folder, and return the first: what `python -m planner run` takes.
-
-        Raises:
-            OSError: They cannot be written.
-        """
-        plan_file = Path(folder) / PLAN_FILE
-        plan_file.parent.mkdir(parents=True, exist_ok=True)
-        save_plan(plan_file, plan_document(self.scan, self.problem, self.plan, self.arm))
-        save_maps(plan_file.with_name(MAP_FILE), {Configuration.parse(self.plan.configuration): self.problem.map})
-        return plan_file
+from planner.planning.scan_planning import PlannedScan, plan_scan
 
 
 def with_factors(scan: Scan, *factors: UserFactor) -> Scan:
@@ -107,9 +61,7 @@ def plan(
     chosen: Planner = planner_named(planner) if isinstance(planner, str) else checked(_name(planner), planner)
     shipped = planner if isinstance(planner, str) else ""
     plans = plan_scan(scan, configuration, angle_count, chosen, lambda _label: None, start_angle_deg, shipped)
-    if plans.best is None:
-        return plans.comparison.farthest[1]
-    return PlannedScan(scan, *plans.best, dict(plans.comparison.outcomes))
+    return plans.best or plans.comparison.farthest[1]
 
 
 def _name(planner: Callable[[Problem], Outcome]) -> str:

@@ -33,7 +33,7 @@ PATTERN_NAMES = ("crossed", "helix", "meridians", "raster", "rings", "spiral", "
 AXES = ("x", "-x", "y", "-y", "z", "-z")
 """Axes of a mesh file that can point up."""
 
-MILLIMETRES: Mapping[str, float] = MappingProxyType({"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4})
+MILLIMETERS: Mapping[str, float] = MappingProxyType({"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4})
 """The units of length that a mesh file may be in, in mm."""
 
 LAG_S = 0.0035

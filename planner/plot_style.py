@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from protocol.whole_file import whole_file
 
-BLUE, VERMILION, GREEN, AMBER, SKY, PURPLE = "#0072b2", "#d55e00", "#009e73", "#e69f00", "#56b4e9", "#cc79a7"
+BLUE, VERMILION, GREEN, AMBER, SKY = "#0072b2", "#d55e00", "#009e73", "#e69f00", "#56b4e9"
 INK, GRAY, PALE = "#23272d", "#7a7f87", "#c9ced4"
 DPI = 130
 WIDTH_IN = 9.6

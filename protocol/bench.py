@@ -76,7 +76,7 @@ Observer = Callable[[TableStatus, bytes, bytes], None]
 """Called after each tick with the status, and the bytes that the firmware has read and that have left."""
 
 
-class InsideView(Protocol):
+class GroundTruth(Protocol):
     """A table that can be looked into and triggered."""
 
     def status(self) -> TableStatus:
@@ -88,7 +88,7 @@ class InsideView(Protocol):
         ...
 
 
-class Bench(InsideView, Protocol):
+class Bench(GroundTruth, Protocol):
     """The bench of any emulated table. Over a control channel each of these may raise a `BenchError`."""
 
     @property

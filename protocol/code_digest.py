@@ -7,6 +7,7 @@ digest is therefore compiled anew when, and only when, something has changed tha
 import dis
 import enum
 import hashlib
+import sys
 from collections.abc import Iterator
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -29,8 +30,11 @@ def code_digest(*values: object) -> str:
         NoDigestError: A function reads a value of another kind.
     """
     content = hashlib.sha256()
-    for part in _Walk().parts(values):
-        content.update(f"{len(part)}:{part}".encode())
+    try:
+        for part in _Walk().parts(values):
+            content.update(f"{len(part)}:{part}".encode())
+    except (RecursionError, ValueError) as error:  # values or modules that hold themselves; an empty cell
+        raise NoDigestError(str(error)) from error
     return content.hexdigest()[:32]
 
 
@@ -54,7 +58,8 @@ class _Walk:
             yield from (
                 self._function_parts(function) if isinstance(function, FunctionType) else self._class_parts(value)
             )
-        elif hasattr(value, "dtype") and hasattr(value, "tobytes"):
+            yield from self.parts(sorted(getattr(value, "targetoptions", {}).items()))  # how numba compiles it
+        elif hasattr(value, "dtype") and hasattr(value, "tobytes") and not value.dtype.hasobject:
             yield f"array {value.dtype} {value.shape} {value.tobytes().hex()}"
         else:
             raise NoDigestError(f"{value!r} has no digest")
@@ -62,6 +67,7 @@ class _Walk:
     def _constant_parts(self, value: Any) -> Iterator[str]:  # noqa: ANN401  # one of `_CONSTANT`
         if isinstance(value, enum.Enum):
             yield f"member {value.name} {value.value!r}"
+            yield from self.parts(type(value))
         elif isinstance(value, tuple | list):
             yield f"{type(value).__name__} {len(value)}"
             if type(value) not in {tuple, list}:
@@ -74,7 +80,7 @@ class _Walk:
             yield f"{type(value).__name__} {value!r}"
 
     def _function_parts(self, function: FunctionType) -> Iterator[str]:
-        yield f"function {function.__name__}"
+        yield f"function {function.__module__} {function.__qualname__}"
         yield from self.parts(function.__defaults__)
         yield from self.parts(tuple(sorted((function.__kwdefaults__ or {}).items())))
         for cell in function.__closure__ or ():
@@ -110,7 +116,9 @@ class _Walk:
             yield from self._read_parts(getattr(value, name), code)
 
     def _class_parts(self, kind: type) -> Iterator[str]:
-        yield f"class {kind.__qualname__}"
+        if not _is_found_by_name(kind):
+            raise NoDigestError(f"{kind!r} is local: code that is loaded again would make another class")
+        yield f"class {kind.__module__} {kind.__qualname__}"
         if issubclass(kind, enum.Enum):
             yield from self.parts(tuple((name, member.value) for name, member in kind.__members__.items()))
         elif issubclass(kind, tuple) and hasattr(kind, "_fields"):
@@ -121,13 +129,27 @@ class _Walk:
 
 
 def _is_known_by_version(value: object) -> bool:
-    return _full_name(value).partition(".")[0] in _KNOWN_BY_VERSION
+    return _full_name(value).partition(".")[0] in _KNOWN_BY_VERSION and _is_found_by_name(value)
+
+
+def _is_found_by_name(value: object) -> bool:
+    """Return whether a module, class or function is the one that its name leads to in any process."""
+    if isinstance(value, ModuleType):
+        return sys.modules.get(value.__name__) is value
+    module, name = _module_and_name(value)
+    found: object = sys.modules.get(module)
+    for part in name.split("."):
+        found = getattr(found, part, None)
+    return found is value and module != "__main__"
 
 
 def _full_name(value: object) -> str:
     """Return the name of a module, function or class, or else an empty one."""
     if isinstance(value, ModuleType):
         return value.__name__
-    if callable(value):
-        return f"{getattr(value, '__module__', None) or type(value).__module__}.{getattr(value, '__name__', '')}"
-    return ""
+    return ".".join(_module_and_name(value)) if callable(value) else ""
+
+
+def _module_and_name(value: object) -> tuple[str, str]:
+    module = getattr(value, "__module__", None) or type(value).__module__
+    return module, getattr(value, "__qualname__", getattr(value, "__name__", ""))

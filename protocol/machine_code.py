@@ -6,17 +6,21 @@ This module needs numba; nothing imports it before something has to be compiled.
 """
 
 import pickle
+import secrets
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numba
 import numba.core.types
 from numba.core import config
+from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.datamodel.models import OpaqueModel
 from numba.core.datamodel.registry import register_default
 from numba.core.serialize import dumps
+from numba.extending import register_jitable
 
 from protocol.code_digest import NoDigestError, code_digest
 from protocol.kept_code import code_folder, code_name, keep_code, load_code
@@ -24,6 +28,12 @@ from protocol.kept_code import code_folder, code_name, keep_code, load_code
 _types: Any = numba.core.types
 _OPTIONS = {"error_model": "numpy", "nogil": True}
 """No Python objects, no bounds checks, IEEE arithmetic (no fast-math, no fused operations)."""
+_WITHIN_OPTIONS = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_INLINED_OPTIONS = {"error_model": "numpy", "forceinline": True}
+
+# Numba numbers what it compiles from 1 in each process, and puts the numbers into the names of symbols. In a process
+# that loads what others have compiled, calls of one function would end in another one of the same name and number.
+FunctionIdentity._unique_ids = iter(partial(secrets.randbits, 63), 0)  # noqa: SLF001  # there is no option
 
 
 def compiled(function: Callable[..., Any]) -> Any:  # noqa: ANN401  # numba's dispatcher
@@ -35,7 +45,12 @@ def compiled(function: Callable[..., Any]) -> Any:  # noqa: ANN401  # numba's di
 
 def within_type(function: Callable[..., Any]) -> Any:  # noqa: ANN401  # numba's type
     """Return the type of `function` for compiled callers only: it has no wrapper for Python, and is not kept alone."""
-    return _Within(numba.njit(**_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function))
+    return _Within(numba.njit(**_WITHIN_OPTIONS)(function))
+
+
+def inlined(function: Callable[..., Any]) -> None:
+    """Let numba compile a plain function where a compiled one calls it, in the place of the call."""
+    register_jitable(**_INLINED_OPTIONS)(function)
 
 
 class _Within(_types.Dispatcher):  # type: ignore[misc]  # numba has no types
@@ -68,7 +83,13 @@ class _KeptCode(_Cache):  # type: ignore[misc]  # numba has no types
         target_context.refresh()
         self._compiling = self._file_name(sig, target_context)
         code = None if self._compiling is None else load_code(self._compiling)
-        return None if code is None else CompileResult._rebuild(target_context, *pickle.loads(code))  # noqa: S301, SLF001  # its digest was compared
+        if code is None:
+            return None
+        try:
+            result = CompileResult._rebuild(target_context, *pickle.loads(code))  # noqa: S301, SLF001  # this user's, whole
+        except Exception:  # of whatever kind: what cannot be loaded is compiled
+            return None
+        return result if result.signature.args == _arguments(sig) else None
 
     def save_overload(self, sig: Any, data: Any) -> None:  # noqa: ANN401  # numba's
         """Keep what was compiled, under the name that was not found just before."""
@@ -88,13 +109,26 @@ class _KeptCode(_Cache):  # type: ignore[misc]  # numba has no types
 
     def _file_name(self, sig: Any, target_context: Any) -> str | None:  # noqa: ANN401  # numba's
         name = code_name(self._function)
-        target = (str(target_context.codegen().magic_tuple()), *_OPTIONS.items())
-        settings = (config.OPT, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT)
+        target = str(target_context.codegen().magic_tuple())
+        options = (*_OPTIONS.items(), *_WITHIN_OPTIONS.items(), *_INLINED_OPTIONS.items())
         try:
-            digest = code_digest(target, settings, *map(_type_parts, getattr(sig, "args", sig)))
+            digest = code_digest(target, options, _settings(), *map(_type_parts, _arguments(sig)))
         except NoDigestError:
             return None
         return None if name is None else f"{name}-{digest[:16]}"
+
+
+def _arguments(sig: Any) -> tuple[Any, ...]:  # noqa: ANN401  # numba's
+    return tuple(getattr(sig, "args", sig))
+
+
+def _settings() -> list[str]:
+    """Return numba's settings, from the environment and its own file, but where files lie and how many threads run."""
+    return sorted(
+        f"{name} {value!r}"
+        for name, value in vars(config).items()
+        if name.isupper() and not name.startswith(("CACHE_", "NUMBA_"))
+    )
 
 
 _PLAIN_TYPES = (

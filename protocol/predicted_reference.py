@@ -7,7 +7,7 @@ of a motion open, or when a reading contradicts it: from then on nothing is know
 from typing import NamedTuple
 
 from protocol.messages import Command, Verb
-from protocol.trapezoid import Motion, plan
+from protocol.trapezoid import Motion, MotionCommand, ReferenceState
 
 # A reading this far from the prediction refutes it: more than a sound table lags behind.
 _STRAYED_DEG = 1.0
@@ -30,7 +30,7 @@ class PredictedReference(NamedTuple):
     motion: Motion | None = None
     began_s: float = 0.0
 
-    def at(self, time_s: float) -> tuple[float, float] | None:
+    def at(self, time_s: float) -> ReferenceState | None:
         """Return position (deg) and speed (deg/s) at a time."""
         return None if self.motion is None else self.motion.at(time_s - self.began_s)
 
@@ -47,7 +47,9 @@ class PredictedReference(NamedTuple):
         target_deg = value if command.verb is Verb.MOVE_TO else None if state is None else state[0] + value
         if state is None or target_deg is None or not top or not rate:
             return self._replace(motion=None, target_deg=target_deg)
-        return self._replace(motion=plan(*state, target_deg, top, rate), target_deg=target_deg, began_s=time_s)
+        return self._replace(
+            motion=Motion.of(state, MotionCommand(target_deg, top, rate)), target_deg=target_deg, began_s=time_s
+        )
 
     def without_setting(self, verb: Verb) -> "PredictedReference":
         """Return the prediction when it is open whether a command of this verb was carried out."""
@@ -65,7 +67,7 @@ class PredictedReference(NamedTuple):
 
     def resting(self, angle_deg: float, time_s: float) -> "PredictedReference":
         """Return the prediction for a table that was seen to rest."""
-        return self._replace(motion=Motion(angle_deg, 0.0, angle_deg, ()), target_deg=angle_deg, began_s=time_s)
+        return self._replace(motion=Motion.at_rest(angle_deg), target_deg=angle_deg, began_s=time_s)
 
     @property
     def rests_s(self) -> float | None:

@@ -1,70 +1,146 @@
-"""The motion that clauses 7.1 and 7.3 prescribe, in closed form: what a table's reference should do.
+"""The trapezoidal velocity profile that P, S and A prescribe, in closed form (section 2.1; clauses 7.1 and 7.3).
 
-It is not the code of a table: phases of constant acceleration, computed at once when a motion is commanded.
+A table's controller plans nothing ahead. At any moment its reference takes the maximum speed that A, S and the distance
+left to brake allow, from the position and the speed that it has. So the reference is known from a command until it
+stands: a few segments of constant acceleration. This is not the code of a table.
 """
 
 import math
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
+# Distances in degrees below this are rounding: the firmware's own unit is a hundred times coarser.
+_ROUNDING_DEG = 1e-9
 
-class Phase(NamedTuple):
-    """A stretch of constant acceleration."""
+
+class ReferenceState(NamedTuple):
+    """Where the reference is, and how fast it moves."""
+
+    angle_deg: float
+    speed_deg_s: float
+
+
+class MotionCommand(NamedTuple):
+    """One motion of the table: `P` with the `S` and the `A` that it latches, the last two above 0."""
+
+    target_deg: float
+    speed_deg_s: float
+    acceleration_deg_s2: float
+
+
+class Segment(NamedTuple):
+    """Constant acceleration for a while."""
 
     duration_s: float
     acceleration_deg_s2: float
 
 
 class Motion(NamedTuple):
-    """A motion from a position and a speed to a target, phase by phase."""
+    """A motion from a position and a speed to a target, segment by segment."""
 
-    start_deg: float
-    start_speed_deg_s: float
+    start: ReferenceState
     target_deg: float
-    phases: tuple[Phase, ...]
+    segments: tuple[Segment, ...]
+
+    @classmethod
+    def of(cls, state: ReferenceState, command: MotionCommand) -> "Motion":
+        """Return the motion from a state that a command prescribes."""
+        return cls(state, command.target_deg, tuple(segments(state, command)))
+
+    @classmethod
+    def at_rest(cls, angle_deg: float) -> "Motion":
+        """Return the motion of a table that stands."""
+        return cls(ReferenceState(angle_deg, 0.0), angle_deg, ())
 
     @property
     def duration_s(self) -> float:
         """The time from the command until the reference stands at the target."""
-        return sum(phase.duration_s for phase in self.phases)
+        return sum(segment.duration_s for segment in self.segments)
 
-    def at(self, time_s: float) -> tuple[float, float]:
+    def at(self, time_s: float) -> ReferenceState:
         """Return the reference's position and speed at a time since the command."""
-        if time_s >= self.duration_s:
-            return self.target_deg, 0.0
-        position, speed = self.start_deg, self.start_speed_deg_s
-        for phase in self.phases:
-            step = min(max(time_s, 0.0), phase.duration_s)
-            position += speed * step + 0.5 * phase.acceleration_deg_s2 * step**2
-            speed += phase.acceleration_deg_s2 * step
-            time_s -= phase.duration_s
-            if time_s <= 0.0:
-                break
-        return position, speed
+        return _along(self.segments, self.start, max(time_s, 0.0)) or ReferenceState(self.target_deg, 0.0)
+
+
+def move(state: ReferenceState, acceleration_deg_s2: float, duration_s: float) -> ReferenceState:
+    """Return the state after a time of constant acceleration: Eq. (3) and (4)."""
+    angle, speed = state
+    return ReferenceState(
+        angle + speed * duration_s + 0.5 * acceleration_deg_s2 * duration_s**2,
+        speed + acceleration_deg_s2 * duration_s,
+    )
+
+
+def segments(state: ReferenceState, command: MotionCommand) -> Iterator[Segment]:
+    """Yield what the reference does from the moment of a command until it stands at the target.
+
+    A target behind, or nearer than the way needed to brake: it brakes at A to zero, passes, and comes back. A lower
+    speed than the present one: it brakes at A to S.
+    """
+    target, top_speed, rate = command
+    distance, speed = target - state.angle_deg, state.speed_deg_s
+    forward = 1.0 if distance > 0.0 or (distance == 0.0 and speed < 0.0) else -1.0
+    distance, speed = forward * distance, forward * speed
+    if speed < 0.0:
+        yield Segment(-speed / rate, forward * rate)
+        distance, speed = distance - braking_way_deg(speed, rate), 0.0
+    passes_by_deg = braking_way_deg(speed, rate) - distance
+    if passes_by_deg > _ROUNDING_DEG:
+        yield Segment(speed / rate, -forward * rate)
+        forward, distance, speed = -forward, passes_by_deg, 0.0
+    if speed > top_speed:
+        yield Segment((speed - top_speed) / rate, -forward * rate)
+        distance, speed = distance - braking_way_deg(speed, rate) + braking_way_deg(top_speed, rate), top_speed
+    peak = max(speed, min(top_speed, math.sqrt(max(0.0, rate * distance + 0.5 * speed**2))))
+    if peak > 0.0:
+        yield Segment((peak - speed) / rate, forward * rate)
+        ways_of_ramps = 2.0 * braking_way_deg(peak, rate) - braking_way_deg(speed, rate)
+        yield Segment(max(0.0, distance - ways_of_ramps) / peak, 0.0)
+        yield Segment(peak / rate, -forward * rate)
+
+
+def advance(state: ReferenceState, command: MotionCommand, duration_s: float) -> ReferenceState:
+    """Return where the reference is `duration_s` after a command; once it stands, exactly at the target."""
+    if math.isinf(command.target_deg):
+        return _go_on(state, command, duration_s)
+    return _along(segments(state, command), state, duration_s) or ReferenceState(command.target_deg, 0.0)
+
+
+def time_to_rest_s(state: ReferenceState, command: MotionCommand) -> float:
+    """Return how long the reference takes to stand at the target."""
+    return sum(segment.duration_s for segment in segments(state, command))
+
+
+def way_to_rest_deg(state: ReferenceState, command: MotionCommand) -> tuple[float, float]:
+    """Return the lowest and the highest angle of the reference until it stands at the target."""
+    ends = [state.angle_deg, command.target_deg]
+    for segment in segments(state, command):
+        state = move(state, segment.acceleration_deg_s2, segment.duration_s)
+        ends.append(state.angle_deg)
+    return min(ends), max(ends)
 
 
 def braking_way_deg(speed_deg_s: float, rate_deg_s2: float) -> float:
     """Return the signed way from a speed to standstill: there is the nearest point at which the table can stand."""
-    return speed_deg_s * abs(speed_deg_s) / (2.0 * rate_deg_s2)
+    return 0.5 * speed_deg_s * abs(speed_deg_s) / rate_deg_s2
 
 
-def plan(start_deg: float, speed_deg_s: float, target_deg: float, top_deg_s: float, rate_deg_s2: float) -> Motion:
-    """Return the motion to a target with top speed S and acceleration A (clauses 7.1/1, 7.1/2, 7.3/2 to 7.3/4)."""
-    phases: list[Phase] = []
-    position, speed = start_deg, speed_deg_s
-    braking_deg = braking_way_deg(speed, rate_deg_s2)
-    direction = math.copysign(1.0, target_deg - position - braking_deg)
-    if speed * direction < 0.0 or (speed != 0.0 and target_deg == position + braking_deg):
-        phases.append(Phase(abs(speed) / rate_deg_s2, -math.copysign(rate_deg_s2, speed)))
-        position, speed = position + braking_deg, 0.0
-    phases += _ahead(abs(target_deg - position), abs(speed), direction, top_deg_s, rate_deg_s2)
-    return Motion(start_deg, speed_deg_s, target_deg, tuple(phases))
+def _along(parts: Iterable[Segment], state: ReferenceState, time_s: float) -> ReferenceState | None:
+    """Return the state at a time from the beginning of the first segment; None after the last."""
+    for segment in parts:
+        if time_s < segment.duration_s:
+            return move(state, segment.acceleration_deg_s2, time_s)
+        state = move(state, segment.acceleration_deg_s2, segment.duration_s)
+        time_s -= segment.duration_s
+    return None
 
 
-def _ahead(distance_deg: float, speed: float, direction: float, top: float, rate: float) -> list[Phase]:
-    """Return the phases to a target ahead, not nearer than the braking distance."""
-    peak = min(math.sqrt(rate * distance_deg + speed**2 / 2.0), max(top, 0.0))
-    change = abs(peak - speed) / rate
-    ramps_deg = 0.5 * (speed + peak) * change + peak**2 / (2.0 * rate)
-    cruise_s = max(distance_deg - ramps_deg, 0.0) / peak if peak else 0.0
-    towards_peak = rate if peak >= speed else -rate
-    return [Phase(change, direction * towards_peak), Phase(cruise_s, 0.0), Phase(peak / rate, -direction * rate)]
+def _go_on(state: ReferenceState, command: MotionCommand, duration_s: float) -> ReferenceState:
+    """Return where the reference is on its way to a target that is infinitely far: one ramp, and then its S."""
+    target, top_speed, rate = command
+    angle, speed = state
+    top = math.copysign(top_speed, target)
+    ramp_s = abs(top - speed) / rate
+    if duration_s < ramp_s:
+        return move(state, math.copysign(rate, top - speed), duration_s)
+    return ReferenceState(angle + 0.5 * (speed + top) * ramp_s + top * (duration_s - ramp_s), top)

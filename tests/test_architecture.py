@@ -28,11 +28,12 @@ ROOMS = {
         "map",
         "planning",
         "execution",
+        "tracking",
         "scanning",
         "adaptive",
         "commands",
     ],
-    "emulator": ["plant", "firmware", "line", "faults", "config", "table", "ports", "server"],
+    "emulator": ["plant", "firmware", "line", "faults", "config", "table", "avr", "ports", "server"],
     "protocol/conformance": [
         "profile",
         "bench",
@@ -48,7 +49,7 @@ ROOMS = {
 
 ABOVE_THE_ROOMS = {
     "planner": {"__init__", "__main__", "api"},
-    "emulator": {"__init__", "__main__", "control_client", "protocol_emulator", "trace"},
+    "emulator": {"__init__", "__main__", "control_client", "protocol_compiled", "protocol_emulator", "trace"},
     "protocol/conformance": {"__init__", "__main__"},
 }
 """The files beside the rooms that may import from them; all others serve every room."""
@@ -77,12 +78,14 @@ PROTOCOL_EDGE = {
     "protocol/clock.py": {"time"},
     "protocol/control_channel.py": {"pathlib", "socket"},
     "protocol/interrupts.py": {"signal", "threading"},
-    "protocol/kept_code.py": {"os", "pathlib", "time"},
-    "protocol/conformance/commands/command_line.py": {"os"},
+    "protocol/ending.py": {"os"},
+    "protocol/kept_code.py": {"pathlib"},
+    "protocol/kept_file.py": {"os", "pathlib", "time"},
     "protocol/progress.py": {"os"},
     "protocol/quiet_start.py": {"os", "signal"},
     "protocol/conformance/__main__.py": {"pathlib"},
     "protocol/data_file.py": {"pathlib"},
+    "protocol/toml_table.py": {"pathlib"},
     "protocol/conformance/pytest/fixture.py": {"pathlib", "subprocess"},
     "protocol/conformance/bench/host_watch.py": {"os", "select", "threading", "time"},
     "protocol/conformance/bench/ports.py": {"pathlib", "serial"},
@@ -101,6 +104,7 @@ PROTOCOL_EDGE = {
 EMULATOR_EDGE = {
     "__main__",
     "clock",
+    "compiled_table",
     "control_client",
     "control_socket",
     "device_link",
@@ -113,6 +117,7 @@ EMULATOR_EDGE = {
     "table_config",
     "tcp_port",
     "terminal_baud",
+    "toolchain",
     "trace",
 }
 
@@ -237,7 +242,9 @@ def test_the_protocol_touches_clock_and_port_at_its_edge_only() -> None:
 
 def test_the_emulator_touches_clock_ports_and_files_at_its_edge_only() -> None:
     touched = {Path(source).stem for source in touched_at_the_edge("emulator")}
-    assert touched - {"__init__", "protocol_emulator"} <= EMULATOR_EDGE  # those two only teach pyserial a port
+    assert (
+        touched - {"__init__", "protocol_compiled", "protocol_emulator"} <= EMULATOR_EDGE
+    )  # they only teach pyserial a port
 
 
 TABLE_NAMES = ("table", "bench", "stand", "view", "simulated", "status", "snapshot", "stand_in")

@@ -17,7 +17,7 @@ from pathlib import Path
 from planner.__main__ import main as planner
 from protocol import TableError
 from protocol.command_line import Parser, program_name
-from tools.command_line import ended
+from protocol.ending import ended
 from tools.preemption import draw_preemption, stand_in
 
 SCAN = "cylinder"

@@ -36,7 +36,7 @@ from planner.plot_style import AMBER, BLUE, SKY, VERMILION, new_figure, save_pic
 from planner.table.cost import Weights
 from planner.table.motion import Limits, limited_acceleration, next_angle, next_speed
 from protocol.command_line import Parser, program_name
-from tools.command_line import ended
+from protocol.ending import ended
 
 # The joint whose factor Fig. 5 shows: joint 1 of the arm.
 JOINT_RANGE_DEG = (-170.0, 170.0)
@@ -197,7 +197,7 @@ def _draw_cylinder(axes: Axes3D, configuration_map: ConfigurationMap, angles_deg
 
 
 def _draw_rays(axes: Axes, problem: Problem, plan: Plan, moment: int) -> None:
-    """Draw each ray from the state at a moment, as far as it is allowed; the chosen one in the plan's colour."""
+    """Draw each ray from the state at a moment, as far as it is allowed; the chosen one in the plan's color."""
     accelerations = ray_accelerations(OBSTACLE_RAYS.rays, problem.limits.acceleration_deg_s2)
     state = float(plan.angles_deg[moment]), float(plan.speeds_deg_s[moment])
     empty = no_cost_to_go(problem)
@@ -259,15 +259,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _draw(options: argparse.Namespace) -> int:
-    try:
-        options.out.mkdir(parents=True, exist_ok=True)
-        for name in options.names or FIGURES:
-            path = options.out / f"{name}.png"
-            save_picture(FIGURES[name](), path)
-            print(path)
-    except OSError as error:
-        print(f"cannot write the figures to {options.out}: {error.strerror}", file=sys.stderr)
-        return 2
+    options.out.mkdir(parents=True, exist_ok=True)
+    for name in options.names or FIGURES:
+        path = options.out / f"{name}.png"
+        save_picture(FIGURES[name](), path)
+        print(path)
     return 0
 
 

@@ -12,15 +12,15 @@ import sys
 from math import inf
 from pathlib import Path
 
-from emulator.config.table_config import load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, load_config
 from protocol.client import TableClient
 from protocol.command_line import Parser, program_name
+from protocol.ending import ended
 from protocol.errors import TableError
 from protocol.page import Origin
 from protocol.progress import share_shown
 from protocol.whole_file import write_whole
-from tools.command_line import check_writable, ended
+from tools.command_line import check_writable
 from tools.identification.errors import RecordingError
 from tools.identification.excitation import excitation
 from tools.identification.fit_checks import check_fit, motor_at_odds

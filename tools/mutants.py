@@ -21,9 +21,9 @@ from typing import NamedTuple
 
 from emulator.table.fast_ticks import LOADED_TICKS
 from protocol.command_line import Parser, program_name
+from protocol.ending import ended
 from protocol.own_program import own_environment, own_program
 from protocol.progress import share_shown
-from tools.command_line import ended
 from tools.mutation import COMPILED, MODULES, Mutation, mutations_of, planted
 
 EXPLAINED = Path(__file__).with_name("mutants.toml")
@@ -54,7 +54,7 @@ def verdict_on(mutation: Mutation, seed: int) -> str:
     from emulator.protocol_emulator import RUN, Serial  # noqa: PLC0415 - the mutation is planted in what is loaded
     from protocol.conformance.bench.stand import InProcess  # noqa: PLC0415
     from protocol.conformance.bench.wire import RecordedPort  # noqa: PLC0415
-    from protocol.conformance.cases.catalogue import all_cases  # noqa: PLC0415
+    from protocol.conformance.cases.catalog import all_cases  # noqa: PLC0415
     from protocol.conformance.judgement.verdict import Verdict  # noqa: PLC0415
     from protocol.conformance.profile.profile import load_profile  # noqa: PLC0415
     from protocol.conformance.session.suite import Session, SessionError  # noqa: PLC0415

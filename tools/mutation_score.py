@@ -25,8 +25,8 @@ from random import Random
 from typing import Final, NamedTuple
 
 from protocol.command_line import Parser, program_name
+from protocol.ending import ended
 from protocol.progress import share_shown
-from tools.command_line import ended
 from tools.mutation import Mutation, mutated_source, mutations_of
 
 ROOT: Final = Path(__file__).parents[1]

@@ -20,7 +20,7 @@ from emulator.trace import Trace, read_trace
 from planner.plot_style import BLUE, GREEN, PALE, SKY, VERMILION, new_figure, save_picture, styled
 from protocol.command_line import Parser, program_name
 from protocol.data_file import did_you_mean
-from tools.command_line import ended
+from protocol.ending import ended
 from tools.command_marks import commands_of, mark_commands
 from tools.envelope import envelope
 

@@ -23,10 +23,10 @@ from emulator.table.table import Table
 from protocol.client import TableClient
 from protocol.codec import decode_reply
 from protocol.command_line import Parser, program_name
+from protocol.ending import ended
 from protocol.errors import TableError
 from protocol.messages import Angle, Ok, Refusal
 from protocol.own_program import own_environment, own_program
-from tools.command_line import ended
 
 _TICK_HZ = 1000
 

@@ -22,13 +22,13 @@ from contextlib import ExitStack
 from math import inf
 from pathlib import Path
 
-from emulator.config.table_config import load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, load_config
 from protocol.command_line import Parser, program_name
+from protocol.ending import ended
 from protocol.page import Origin
 from protocol.progress import share_shown
 from protocol.whole_file import whole_file
-from tools.command_line import check_folder, ended
+from tools.command_line import check_folder
 from tools.tuning.bounds import Limits
 from tools.tuning.figures_json import figures_json
 from tools.tuning.gain_design import Design
@@ -158,8 +158,8 @@ def _print(tuning: Tuning) -> None:
         )
     for before, after in tuning.checks:
         for old, new in zip(before.figures, after.figures, strict=True):
-            foretold = "" if new.model is None else f" (model {new.model:.3g})"
-            print(f"{new.title}: {old.emulator:.3g} -> {new.emulator:.3g} {new.unit}{foretold}")
+            predicted = "" if new.model is None else f" (model {new.model:.3g})"
+            print(f"{new.title}: {old.emulator:.3g} -> {new.emulator:.3g} {new.unit}{predicted}")
 
 
 def _bounds(design: Design) -> str:

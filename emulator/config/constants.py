@@ -1,7 +1,6 @@
 """The constants of plant and controller, per tick and in the firmware's formats, from a table's configuration."""
 
-from emulator.config.table_config import GainsConfig, TableConfig
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, GainsConfig, TableConfig
 from emulator.firmware.controller import Firmware
 from emulator.firmware.fixed_point import gain_registers, to_fixed
 from emulator.firmware.pid import Gains, Pid

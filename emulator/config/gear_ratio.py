@@ -1,22 +1,7 @@
 """A gear ratio as the fraction of integers that its teeth make: 2197/27 or 4989/10, and never 81.37037."""
 
 import math
-import re
 from fractions import Fraction
-
-_FRACTION = re.compile(r"\s*([0-9]{1,10})\s*/\s*([0-9]{1,10})\s*")
-
-
-def ratio_in(text: str) -> float:
-    """Return the ratio that a text such as `2197/27` states.
-
-    Raises:
-        ValueError: it is not a fraction of integers, or it divides by 0.
-    """
-    parts = _FRACTION.fullmatch(text)
-    if parts is None or int(parts[2]) == 0:
-        raise ValueError(f"{text[:60]!r} is not a fraction of integers")
-    return int(parts[1]) / int(parts[2])
 
 
 def simplest_fraction(value: float) -> Fraction:

@@ -3,21 +3,21 @@
 The numbers themselves, and where each comes from, are in `default.toml`.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from math import ceil, inf
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from emulator.config.gear_ratio import simplest_fraction
-from emulator.config.toml_section import ConfigError, merged, quantity, section
 from emulator.faults.fault import FaultError, fault_from
-from emulator.faults.parameter import brief
 from emulator.firmware.fixed_point import ERROR_BITS, ERROR_MAX, gain_registers, motion_bits
 from emulator.int32 import INT32_MAX
 from protocol.bench import Fault
-from protocol.data_file import DataFileError, read_toml
+from protocol.data_file import read_toml
+from protocol.toml_section import quantity, section
+from protocol.toml_table import TomlTable
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
 
@@ -25,22 +25,26 @@ _FINER = "a higher encoder.lines or gears.ratio, a lower control.tick_hz or a lo
 _COARSER = "a lower encoder.lines or gears.ratio, a higher control.tick_hz or a shorter control.speed_window_ticks"
 
 
+class ConfigError(ValueError):
+    """A configuration that cannot be used; the message names the file, the key and what is allowed."""
+
+
 @dataclass(frozen=True)
 class MotorConfig:
     """The DC motor, from its datasheet."""
 
-    resistance_ohm: float = quantity(least=1e-3, most=1e4)
-    inductance_H: float = quantity(least=1e-6, most=10)
-    torque_constant_Nm_A: float = quantity(least=1e-6, most=100)
-    rotor_inertia_kg_m2: float = quantity(least=1e-10, most=10)
+    resistance_ohm: float = quantity(at_least=1e-3, at_most=1e4)
+    inductance_H: float = quantity(at_least=1e-6, at_most=10)
+    torque_constant_Nm_A: float = quantity(at_least=1e-6, at_most=100)
+    rotor_inertia_kg_m2: float = quantity(at_least=1e-10, at_most=10)
 
 
 @dataclass(frozen=True)
 class DriverConfig:
     """The PWM bridge."""
 
-    supply_V: float = quantity(above=0, most=1000)
-    pwm_bits: int = quantity(least=4, most=11)
+    supply_V: float = quantity(above=0, at_most=1000)
+    pwm_bits: int = quantity(at_least=4, at_most=11)
 
     @property
     def duty_max(self) -> int:
@@ -52,52 +56,52 @@ class DriverConfig:
 class GearsConfig:
     """The spur gear chain between motor and table."""
 
-    ratio: float = quantity(least=1, most=1e5, fraction=True)
-    efficiency: float = quantity(least=0.01, most=1)
-    inertia_kg_m2: float = quantity(least=0, most=10)
-    backlash_arcmin: float = quantity(least=0, most=600)
+    ratio: float = quantity(at_least=1, at_most=1e5, fraction=True)
+    efficiency: float = quantity(at_least=0.01, at_most=1)
+    inertia_kg_m2: float = quantity(at_least=0, at_most=10)
+    backlash_arcmin: float = quantity(at_least=0, at_most=600)
 
 
 @dataclass(frozen=True)
 class DiscConfig:
     """The table's disc with the workpiece on it."""
 
-    inertia_kg_m2: float = quantity(least=1e-9, most=1e6)
-    bearing_friction_Nm: float = quantity(least=0, most=1e5)
+    inertia_kg_m2: float = quantity(at_least=1e-9, at_most=1e6)
+    bearing_friction_Nm: float = quantity(at_least=0, at_most=1e5)
 
 
 @dataclass(frozen=True)
 class FrictionConfig:
     """Friction of motor and gears at the motor's shaft."""
 
-    coulomb_Nm: float = quantity(least=0, most=1e3)
-    stiction_ratio: float = quantity(least=1, most=10)
-    stribeck_speed_rad_s: float = quantity(least=1e-3, most=1e4)
-    viscous_Nm_s: float = quantity(least=0, most=1)
+    coulomb_Nm: float = quantity(at_least=0, at_most=1e3)
+    stiction_ratio: float = quantity(at_least=1, at_most=10)
+    stribeck_speed_rad_s: float = quantity(at_least=1e-3, at_most=1e4)
+    viscous_Nm_s: float = quantity(at_least=0, at_most=1)
 
 
 @dataclass(frozen=True)
 class EncoderConfig:
     """The quadrature encoder on the motor's shaft."""
 
-    lines: int = quantity(least=1, most=10_000)
+    lines: int = quantity(at_least=1, at_most=10_000)
 
 
 @dataclass(frozen=True)
 class ControlConfig:
     """The firmware's clock and speed estimate."""
 
-    tick_hz: int = quantity(least=100, most=100_000)
-    speed_window_ticks: int = quantity(least=1, most=256)
+    tick_hz: int = quantity(at_least=100, at_most=100_000)
+    speed_window_ticks: int = quantity(at_least=1, at_most=256)
 
 
 @dataclass(frozen=True)
 class GainsConfig:
     """One PID gain set: u = K (e + integral(e) / Ti - Td d(omega)/dt), e in deg/s, u = 1 at full duty."""
 
-    proportional_duty_s_deg: float = quantity(least=0, most=1e6)
-    integral_time_s: float = quantity(least=1e-6, most=1e6)
-    derivative_time_s: float = quantity(least=0, most=1e3)
+    proportional_duty_s_deg: float = quantity(at_least=0, at_most=1e6)
+    integral_time_s: float = quantity(at_least=1e-6, at_most=1e6)
+    derivative_time_s: float = quantity(at_least=0, at_most=1e3)
 
 
 @dataclass(frozen=True)
@@ -112,35 +116,35 @@ class GainSetsConfig:
 class SettlingConfig:
     """How the table is brought to its target once the profile has ended."""
 
-    arrival_count: int = quantity(least=0, most=100)
-    arrival_time_s: float = quantity(least=0, most=10)
-    approach_rate_1_s: float = quantity(above=0, most=100)
-    approach_speed_deg_s: float = quantity(above=0, most=1e6)
+    arrival_count: int = quantity(at_least=0, at_most=100)
+    arrival_time_s: float = quantity(at_least=0, at_most=10)
+    approach_rate_1_s: float = quantity(above=0, at_most=100)
+    approach_speed_deg_s: float = quantity(above=0, at_most=1e6)
 
 
 @dataclass(frozen=True)
 class ProtectionConfig:
     """When a motor that does not turn is switched off."""
 
-    stall_duty: float = quantity(above=0, most=1)
-    stall_time_s: float = quantity(above=0, most=3600)
-    settling_time_s: float = quantity(above=0, most=3600)
+    stall_duty: float = quantity(above=0, at_most=1)
+    stall_time_s: float = quantity(above=0, at_most=3600)
+    settling_time_s: float = quantity(above=0, at_most=3600)
 
 
 @dataclass(frozen=True)
 class MotionConfig:
     """A speed and an acceleration of the table."""
 
-    speed_deg_s: float = quantity(above=0, most=1e6)
-    acceleration_deg_s2: float = quantity(above=0, most=1e9)
+    speed_deg_s: float = quantity(above=0, at_most=1e6)
+    acceleration_deg_s2: float = quantity(above=0, at_most=1e9)
 
 
 @dataclass(frozen=True)
 class SerialConfig:
     """The serial line."""
 
-    baud: int = quantity(least=0, most=4_000_000)
-    decimals: int = quantity(least=1, most=6)
+    baud: int = quantity(at_least=0, at_most=4_000_000)
+    decimals: int = quantity(at_least=1, at_most=6)
     strict: bool = quantity()
 
 
@@ -199,10 +203,9 @@ class TableConfig:
         Raises:
             ConfigError: A setting is outside its range.
         """
-        serial = self.serial
         chosen = {key: value for key, value in changes.items() if value is not None}
-        values = {entry.name: getattr(serial, entry.name) for entry in fields(serial)} | chosen
-        return replace(self, serial=section(SerialConfig, values, "serial settings", "serial"))
+        given = TomlTable("serial settings", chosen, "serial.", ConfigError)
+        return replace(self, serial=section(SerialConfig, given, asdict(self.serial)))
 
 
 def load_config(path: str | Path | None = None) -> TableConfig:
@@ -211,33 +214,20 @@ def load_config(path: str | Path | None = None) -> TableConfig:
     Raises:
         ConfigError: The file cannot be read, or a key, a type, a range or a combination is wrong.
     """
-    defaults = _read(DEFAULT_FILE)
-    source = DEFAULT_FILE.name if path is None else str(path)
-    changes = {} if path is None else _read(Path(path))
-    faults = _faults(changes.pop("faults", []), f"{source}: faults")
-    values = merged(defaults, changes, source) | {"faults": faults}
-    config: TableConfig = section(TableConfig, values, source)
-    _check_together(config, source)
+    default = TomlTable(DEFAULT_FILE.name, {}, error=ConfigError)
+    top = default if path is None else TomlTable.load(Path(path), ConfigError)
+    config = section(TableConfig, top, read_toml(DEFAULT_FILE), faults=_faults(top))
+    _check_together(config, str(top.file))
     return config
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _faults(top: TomlTable) -> tuple[Fault, ...]:
+    """Return the faults of `[[faults]]`: each has its name in the key `fault`, and its numbers beside it."""
+    entries = [dict(entry.values) for entry in top.tables("faults")]
     try:
-        return read_toml(path)
-    except DataFileError as error:
-        raise ConfigError(str(error)) from error
-
-
-def _faults(entries: object, where: str) -> tuple[Fault, ...]:
-    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise ConfigError(f"{where} is {brief(entries)}; each fault is a table of its own, [[faults]]")
-    try:
-        return tuple(
-            fault_from(entry.get("fault"), {key: value for key, value in entry.items() if key != "fault"})
-            for entry in entries
-        )
+        return tuple(fault_from(entry.pop("fault", None), entry) for entry in entries)
     except FaultError as error:
-        raise ConfigError(f"{where}: {error}") from error
+        raise ConfigError(f"{top.file}: faults: {error}") from error
 
 
 def _check_together(config: TableConfig, source: str) -> None:

@@ -8,8 +8,9 @@ from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from emulator.faults.parameter import Parameter, brief
+from emulator.faults.parameter import Parameter
 from protocol.bench import Fault
+from protocol.data_file import shown
 
 
 class FaultError(ValueError):
@@ -164,7 +165,7 @@ def fault_from(kind: object, given: Mapping[str, object]) -> Fault:
         FaultError: the fault is unknown, a number is missing, unknown or out of range, or two beginnings are given.
     """
     if not isinstance(kind, str) or kind not in KINDS:
-        raise FaultError(f"{brief(kind)} is not a fault; there are {', '.join(KINDS)}")
+        raise FaultError(f"{shown(kind)} is not a fault; there are {', '.join(KINDS)}")
     _check_numbers(kind, given)
     whole = {parameter.name: parameter.whole for parameter in parameters_of(kind)}
     values: dict[str, Any] = {
@@ -186,7 +187,7 @@ def _check_numbers(kind: str, given: Mapping[str, object]) -> None:
             raise FaultError(f"{kind}: {parameter.name} is missing; it must be {parameter.allowed}")
         if parameter.name in given and not parameter.accepts(given[parameter.name]):
             raise FaultError(
-                f"{kind}: {parameter.name} is {brief(given[parameter.name])}; it must be {parameter.allowed}"
+                f"{kind}: {parameter.name} is {shown(given[parameter.name])}; it must be {parameter.allowed}"
             )
     if "at_s" in given and "at_command" in given:
         raise FaultError(f"{kind}: at_s and at_command are two beginnings; give one of them")

@@ -16,7 +16,7 @@ LOST: Final = None
 """Stands in the receive buffer where bytes were lost."""
 
 
-class _Wire:
+class Wire:
     """One direction of the line, on which bytes follow each other without a gap."""
 
     def __init__(self, baud: int, tick_hz: int) -> None:
@@ -65,8 +65,8 @@ class Uart:
 
     def __init__(self, baud: int, tick_hz: int) -> None:
         """Start with an idle line."""
-        self._incoming = _Wire(baud, tick_hz)
-        self._outgoing = _Wire(baud, tick_hz)
+        self._incoming = Wire(baud, tick_hz)
+        self._outgoing = Wire(baud, tick_hz)
         self._received: deque[int | None] = deque()
         self._sent = bytearray()
         self._never_overruns = baud <= RECEIVE_LIMIT * 10 * tick_hz  # bytes within a tick

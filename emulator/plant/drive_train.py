@@ -13,7 +13,7 @@ import math
 from typing import NamedTuple
 
 from emulator.plant.friction import Friction, sliding_torque_Nm
-from emulator.plant.motor import Motor, MotorStep, discretise
+from emulator.plant.motor import Motor, MotorStep, discretize
 
 
 class Gears(NamedTuple):
@@ -68,10 +68,10 @@ class DriveTrain(NamedTuple):
 
         def coupling(torque_ratio: float) -> Coupling:
             inertia = table_inertia_kg_m2 * torque_ratio / gears.ratio
-            return Coupling(discretise(motor, motor_inertia + inertia, tick_s), torque_ratio, inertia)
+            return Coupling(discretize(motor, motor_inertia + inertia, tick_s), torque_ratio, inertia)
 
         return cls(
-            free=discretise(motor, motor_inertia, tick_s),
+            free=discretize(motor, motor_inertia, tick_s),
             driving=coupling(1.0 / (gears.ratio * gears.efficiency)),
             overhauling=coupling(gears.efficiency / gears.ratio),
             friction=friction,

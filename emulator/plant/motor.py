@@ -1,4 +1,4 @@
-"""The DC motor, and its exact zero-order-hold discretisation.
+"""The DC motor, and its exact zero-order-hold discretization.
 
     L di/dt = v - R i - K w          the electrical side, current i, voltage v
     J dw/dt = K i - B w - m          the mechanical side, speed w, resisting torque m
@@ -41,7 +41,7 @@ class MotorStep(NamedTuple):
     angle_torque: float
 
 
-def discretise(motor: Motor, inertia_kg_m2: float, tick_s: float) -> MotorStep:
+def discretize(motor: Motor, inertia_kg_m2: float, tick_s: float) -> MotorStep:
     """Return the exact step of a motor that turns the given inertia, its rotor's included, for inputs held a tick."""
     r, l, k, _, b = motor  # noqa: E741  # L
     j = inertia_kg_m2

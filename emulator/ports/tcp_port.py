@@ -5,9 +5,9 @@ import socket
 from collections.abc import Callable
 from contextlib import suppress
 
-from emulator.faults.parameter import brief
 from emulator.ports.outbox import Outbox
 from emulator.ports.port import Arrival
+from protocol.data_file import shown
 
 LOOPBACK = "127.0.0.1"
 READ_BYTES = 256
@@ -26,7 +26,7 @@ def parse_address(text: str) -> tuple[str, int]:
     bare = host[1:-1] if host.startswith("[") and host.endswith("]") else host
     is_port = port.isascii() and port.isdigit() and len(port) <= 5 and int(port) <= 65535
     if not is_port or (":" in bare and bare == host):
-        raise ValueError(f"{brief(text)} is not [HOST:]PORT with a port from 0 (any free one) to 65535")
+        raise ValueError(f"{shown(text)} is not [HOST:]PORT with a port from 0 (any free one) to 65535")
     return bare or LOOPBACK, int(port)
 
 

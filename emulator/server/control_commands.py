@@ -9,9 +9,10 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
 
 from emulator.faults.fault import KINDS, FaultError, fault_from, help_of, parameters_of
-from emulator.faults.parameter import Parameter, brief
+from emulator.faults.parameter import Parameter
 from emulator.server.clock import TIME_SCALE
 from protocol.bench import Bench
+from protocol.data_file import shown
 
 
 class Stand(Protocol):
@@ -114,7 +115,7 @@ def _parse(request: bytes) -> tuple[Command, dict[str, float]]:
     if not isinstance(fields, dict) or not isinstance(name := fields.pop("command", None), str):
         raise RequestError('a request is a JSON object that names its command, such as {"command": "state"}')
     if name not in COMMANDS:
-        raise RequestError(f"{brief(name)} is not a command; there are {', '.join(COMMANDS)}")
+        raise RequestError(f"{shown(name)} is not a command; there are {', '.join(COMMANDS)}")
     command = COMMANDS[name]
     required = {parameter.name for parameter in command.parameters if not parameter.optional}
     if not required <= fields.keys() <= {parameter.name for parameter in command.parameters}:
@@ -153,7 +154,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _number(command: str, parameter: Parameter, value: Any) -> float:  # noqa: ANN401  # from outside
     if parameter.accepts(value):
         return float(value)
-    raise RequestError(f"{command}: {parameter.name} must be {parameter.allowed}, not {brief(value)}")
+    raise RequestError(f"{command}: {parameter.name} must be {parameter.allowed}, not {shown(value)}")
 
 
 def refusal(sentence: str) -> bytes:

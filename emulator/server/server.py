@@ -13,9 +13,9 @@ from emulator.ports.port import Arrival, Port, spoiled
 from emulator.ports.readiness import wait_for
 from emulator.server.clock import Clock
 from emulator.server.signals import SignalWatch
-from emulator.table.table import Table
 
 if TYPE_CHECKING:
+    from emulator.avr.compiled_table import AnyTable
     from emulator.server.control_socket import ControlSocket
 
 _LONGEST_SLEEP_S = 0.02
@@ -50,7 +50,7 @@ class Server:
 
     def __init__(
         self,
-        table: Table,
+        table: "AnyTable",
         clock: Clock,
         ports: Sequence[Port],
         signals: SignalWatch,

@@ -5,6 +5,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import NamedTuple
 
+from emulator.config.gear_ratio import simplest_fraction
 from emulator.config.table_config import TableConfig
 from emulator.firmware.controller import FirmwareState, begin_motion, distance_to
 from emulator.firmware.fixed_point import to_fixed
@@ -30,8 +31,12 @@ class Interpreter:
 
     def __init__(self, config: TableConfig) -> None:
         """Take the units and limits of a configured table."""
-        self._limits = config.limits
-        self._power_on = config.power_on
+        limits, power_on = config.limits, config.power_on
+        # As they are written in the file: the nearest float of 33.3 is below it, and would refuse `S 33.3`.
+        self._speed_limit = simplest_fraction(limits.speed_deg_s)
+        self._acceleration_limit = simplest_fraction(limits.acceleration_deg_s2)
+        self._first_speed = simplest_fraction(power_on.speed_deg_s)
+        self._first_acceleration = simplest_fraction(power_on.acceleration_deg_s2)
         self._count_deg = config.counts_per_turn / 360
         self._bits = config.motion_bits
         self._last_position = INT32_MAX << self._bits
@@ -40,13 +45,12 @@ class Interpreter:
 
     def power_on(self) -> Registers:
         """Return the registers as the controller wakes; the latch holds the position at power-on."""
-        speed = self._speed(Fraction(self._power_on.speed_deg_s))
-        return Registers(speed, self._acceleration(Fraction(self._power_on.acceleration_deg_s2)), 0)
+        return Registers(self._speed(self._first_speed), self._acceleration(self._first_acceleration), 0)
 
     def angle_deg(self, count: int) -> Decimal:
-        """Return the angle of a count, to ten decimals."""
+        """Return the angle of a count, with so many digits that rounding it once more rounds the exact angle."""
         angle = count / self._count_deg
-        return (Decimal(angle.numerator) / angle.denominator).quantize(Decimal("1e-10"))
+        return Decimal(angle.numerator) / angle.denominator
 
     def execute(self, command: Command, controller: FirmwareState, registers: Registers) -> Outcome:
         """Return the reply, and controller and registers after the command; a refused one changes nothing.
@@ -80,7 +84,7 @@ class Interpreter:
         """S: the top speed of the next motion."""
         value = _value(command)
         speed = self._speed(value)
-        if speed < 1 or value > self._limits.speed_deg_s:
+        if speed < 1 or value > self._speed_limit:
             return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
         return Ok(), controller, registers._replace(speed=speed)
 
@@ -88,7 +92,7 @@ class Interpreter:
         """A: the acceleration of the next motion."""
         value = _value(command)
         acceleration = self._acceleration(value)
-        if acceleration < 1 or value > self._limits.acceleration_deg_s2:
+        if acceleration < 1 or value > self._acceleration_limit:
             return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
         return Ok(), controller, registers._replace(acceleration=acceleration)
 

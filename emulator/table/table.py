@@ -148,6 +148,11 @@ class Table:
         loop.state = self._woken(loop.constants, drive)
 
     @property
+    def duty(self) -> int:
+        """The duty on the bridge in the coming tick, in PWM steps; below 0 it drives backwards."""
+        return self._loop.state.duty
+
+    @property
     def received_queue(self) -> int:
         """Bytes on their way to the firmware."""
         return self._serial.uart.waiting_count

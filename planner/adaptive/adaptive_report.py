@@ -86,7 +86,7 @@ def _strips(scanned: AdaptiveScanned) -> Iterator[tuple[Cell, ...]]:
     visible = max(1, int(scanned.visible.sum()))
     shares = [(f"{seen / visible:.1%}", f"{seen / scanned.places:.1%}") for seen in scanned.seen_after]
     if scanned.path is not None:
-        motion = scanned.path.motion
+        motion = scanned.path.motion()
         way = f"{motion.start_deg:.0f} to {scanned.path.plan.angles_deg[-1]:.0f}"
         yield (
             "path",
@@ -117,7 +117,7 @@ def _refused(scanned: AdaptiveScanned) -> Iterator[str]:
 
 def _regions(scanned: AdaptiveScanned) -> Iterator[tuple[Cell, ...]]:
     for number, region in enumerate(scanned.regions[:_REGIONS], 1):
-        middle = ", ".join(f"{value:.0f}" for value in region.centre_W)
+        middle = ", ".join(f"{value:.0f}" for value in region.center_W)
         yield (
             str(number), f"{region.area_mm2 / _MM2:.2f}", f"{region.can_be_seen_mm2 / _MM2:.2f}", middle,
             REASONS[region.reason],
@@ -161,7 +161,7 @@ def adaptive_document(scanned: AdaptiveScanned) -> dict[str, Any]:
             {
                 "area_mm2": region.area_mm2,
                 "can_be_seen_mm2": region.can_be_seen_mm2,
-                "centre_W": region.centre_W.tolist(),
+                "center_W": region.center_W.tolist(),
                 "reason": region.reason.name.lower(),
             }
             for region in scanned.regions

@@ -19,6 +19,7 @@ from planner.cell.obstacles import workpiece_obstacle
 from planner.cell.scan import Scan
 from planner.defaults import MOST_STRIPS, SHARE_SEEN
 from planner.execution.dead_line import DeadLine, judge_dead_line
+from planner.execution.run_input import RunInput
 from planner.scanning.latched_run import LatchedRun, joined, number_after, numbered_from
 from planner.scanning.measuring import COVERED_MM, Measuring
 from planner.scanning.point_cloud import PlyWriter, XyzWriter
@@ -27,7 +28,6 @@ from planner.scanning.scan_run import (
     CLOUD_FILE,
     XYZ_FILE,
     Knowledge,
-    Planned,
     ScanError,
     Scanned,
     ScanOptions,
@@ -76,7 +76,7 @@ class AdaptiveScanned:
     scanned: Scanned
     session: Session
     strips: tuple[ScannedStrip, ...]
-    path: Planned | None
+    path: RunInput | None
     draws_back: Transfer | None
     wanted: float
     visible: BoolArray
@@ -118,7 +118,7 @@ class AdaptiveScanned:
     @property
     def duration_s(self) -> float:
         """How long the session takes: path, strips, the ways between them, and drawing back."""
-        path_s = 0.0 if self.path is None else self.path.motion.end_s - self.path.motion.start_s
+        path_s = 0.0 if self.path is None else self.path.motion().end_s - self.path.motion().start_s
         back_s = 0.0 if self.draws_back is None else self.draws_back.duration_s
         return path_s + sum(strip.duration_s for strip in self.strips) + back_s
 
@@ -139,11 +139,11 @@ class _Cloud:
     def __post_init__(self) -> None:
         self.first_seen = np.full(len(self.work.coverage.codes), -1, dtype=np.int64)
 
-    def take(self, planned: Planned, run: LatchedRun) -> Returned:
+    def take(self, planned: RunInput, run: LatchedRun) -> Returned:
         """Measure, align and write a run."""
         first = number_after(self.runs[-1]) if self.runs else 0
         self.runs.append(numbered_from(run, first))
-        self.dead_lines.append(judge_dead_line(planned.map, planned.motion, run.record))
+        self.dead_lines.append(judge_dead_line(planned.problem.map, planned.motion(), run.record))
         measured = self.work.take(chain_of(self.scan, self.knowledge, self.runs[-1]), self.ply, self.xyz, None)
         is_new = (self.work.coverage.codes == Sight.SEEN) & (self.first_seen < 0)
         self.first_seen[is_new] = len(self.runs) - 1

@@ -13,9 +13,9 @@ import numpy as np
 
 from planner.arrays import BoolArray, FloatArray
 from planner.cell.cell import Cell
-from planner.cell.clearance import clearances
 from planner.cell.collision_model import CollisionModel
 from planner.cell.obstacles import Obstacle, bounding_box
+from planner.cell.pose_clearance import clearances
 
 # A piece in which nothing moves by more than this is not halved again: its middle decides.
 _FINEST_MM = 0.5

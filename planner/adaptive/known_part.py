@@ -14,7 +14,7 @@ import trimesh
 from planner.adaptive.candidates import POSES, candidate_sweeps
 from planner.adaptive.choice import choose
 from planner.adaptive.policy import PolicyError, Returned
-from planner.adaptive.reach import allowed, filled_up, reach, usable
+from planner.adaptive.reach import allowed, filled_up, reach, trimmed, usable
 from planner.adaptive.strip import Strip
 from planner.adaptive.surroundings import Surroundings
 from planner.adaptive.visibility import Places, sees
@@ -23,7 +23,7 @@ from planner.cell.obstacles import Obstacle
 from planner.cell.scan_path import ScanPath
 from planner.geometry.ray_casting import RayCaster
 from planner.scanning.coverage import Coverage
-from planner.scanning.error_account import signed_distances_mm
+from planner.scanning.error_budget import signed_distances_mm
 from planner.scanning.measuring import COVERED_MM
 from planner.scanning.probe import LaserProbe, Sight
 from protocol.progress import Progress
@@ -199,7 +199,8 @@ class KnownPart:
         at_angles = allowed(self._surroundings, self._solid, poses).reshape(8, len(strips), POSES, -1)
         found = reach(at_angles, turn_samples=1)
         kept = usable(found, _FEWEST_POSES)
-        swept = [strips[k, found.first[k] : found.last[k] + 1] for k in kept]
+        whole = trimmed(strips, found)
+        swept = [whole[k] for k in kept]
         if not swept:
             return nothing
         seen = sees(self._caster, self._probe, *filled_up(swept, POSES), self._places)

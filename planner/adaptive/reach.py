@@ -80,6 +80,11 @@ def _stepped(alive: BoolArray, here: BoolArray, there: BoolArray, turn_samples: 
     return np.asarray(reached)
 
 
+def trimmed(T_WS: FloatArray, found: Reach) -> list[FloatArray]:
+    """Return the part of each strip `(n, k, 4, 4)` that can be swept, as `(j, 4, 4)`."""
+    return [poses[first : last + 1] for poses, first, last in zip(T_WS, found.first, found.last, strict=True)]
+
+
 def usable(found: Reach, fewest_poses: int) -> IndexArray:
     """Return the numbers of the strips of which at least so many poses can be swept."""
     return np.flatnonzero(found.counts >= fewest_poses)

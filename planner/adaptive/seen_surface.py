@@ -14,9 +14,9 @@ from planner.geometry.thinned_cloud import ThinnedCloud
 
 # In cells of the thinned cloud: how far neighbors are looked for, and half the side of the square that stands for a
 # point when shadows are cast; squares of neighbors overlap.
-_NEIGHBOURS_CELLS = 2.5
+_NEIGHBORS_CELLS = 2.5
 _HALF_SQUARE_CELLS = 0.75
-_NEIGHBOURS = 24
+_NEIGHBORS = 24
 _GAP_RAD = np.radians(110.0)
 """Angle about a point without a neighbor from which on the surface ends there."""
 
@@ -45,7 +45,7 @@ class Estimate:
 
     def __init__(self, cloud: ThinnedCloud) -> None:
         """Estimate the surface of a cloud."""
-        radius_mm = _NEIGHBOURS_CELLS * cloud.cell_mm
+        radius_mm = _NEIGHBORS_CELLS * cloud.cell_mm
         found = point_normals(cloud.points, cloud.beams, radius_mm)
         self.points: FloatArray = cloud.points[found.is_known]
         self.normals: FloatArray = found.normals[found.is_known]
@@ -71,7 +71,7 @@ class Estimate:
     def rim(self) -> Rim:
         """Where the surface ends: points with no neighbor in a wide angle about them."""
         along, across = _tangents(self.normals)
-        _, neighbours = self.tree.query(self.points, k=_NEIGHBOURS + 1, distance_upper_bound=self._radius_mm)
+        _, neighbours = self.tree.query(self.points, k=_NEIGHBORS + 1, distance_upper_bound=self._radius_mm)
         neighbours = np.asarray(neighbours)[:, 1:]
         found = neighbours < len(self.points)
         neighbours = np.where(found, neighbours, 0)

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 from planner.adaptive.strip import Strip
 from planner.adaptive.surroundings import Surroundings
-from planner.arrays import FloatArray
 from planner.cell.obstacles import Obstacle
 from planner.cell.scan_path import ScanPath
-from planner.execution.free_way import WayError, check_ends
+from planner.execution.clear_path import BlockedPathError, check_ends
+from planner.execution.run_input import RunInput
 from planner.execution.table_motion import TableMotion
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
@@ -18,7 +18,6 @@ from planner.planning.arm_motion import arm_motion
 from planner.planning.arm_on_path import arm_along
 from planner.planning.plan import NoPlan, Plan, Planner
 from planner.planning.problem import Problem
-from planner.scanning.scan_run import Planned
 
 # Where the arm cannot follow at the strip's own speed, it may be swept this much slower.
 _SLOWER = (1.0, 2.0, 4.0)
@@ -30,34 +29,25 @@ class StripPlan:
 
     Attributes:
         strip: As it will be swept, perhaps slower than asked.
-        problem: The map in the configuration of the plan, with limits, weights and arm.
-        plan: The table's motion.
-        joints_deg: `(n, 6)` the robot's joints at the strip's poses.
+        planned: The motion, as that of any scan.
     """
 
     strip: Strip
-    problem: Problem
-    plan: Plan
-    joints_deg: FloatArray
+    planned: RunInput
 
     @property
-    def configuration(self) -> Configuration:
-        """The arm configuration."""
-        return Configuration.parse(self.plan.configuration)
-
-    @property
-    def planned(self) -> Planned:
-        """The same as the plan of any scan."""
-        return Planned(self.plan, self.joints_deg, self.problem.limits, self.problem.map)
+    def plan(self) -> Plan:
+        """The table's motion."""
+        return self.planned.plan
 
     @property
     def motion(self) -> TableMotion:
-        """What the table does."""
-        return self.planned.motion
+        """What the table does, from the run-up to the stop."""
+        return self.planned.motion()
 
     def turned(self, turns: int) -> "StripPlan":
         """Return the same, full turns of the table farther."""
-        return replace(self, plan=self.plan.turned(turns))
+        return replace(self, planned=self.planned.turned(turns))
 
 
 def plan_strip(
@@ -106,9 +96,9 @@ def _planned(
     fault = arm_fault(PlannedArm(surroundings.cell, strip.T_WS, joints_deg), plan)
     if fault is not None:
         return fault
-    planned = StripPlan(strip, problem, plan, joints_deg)
+    planned = RunInput(surroundings.name, plan, problem, joints_deg, surroundings.cell.arm)
     try:
-        check_ends(map_, planned.motion)
-    except WayError as error:
+        check_ends(map_, planned.motion())
+    except BlockedPathError as error:
         return str(error)
-    return planned
+    return StripPlan(strip, planned)

@@ -16,16 +16,16 @@ from planner.adaptive.transfer import Stance, Transfer, Transfers, move_time_s
 from planner.cell.obstacles import Obstacle
 from planner.defaults import DEFAULT_PLANNER
 from planner.errors import PlannerError
-from planner.execution.free_way import nearest_turns
+from planner.execution.clear_path import nearest_turns
 from planner.execution.run_input import RunInput
 from planner.execution.run_record import Record
 from planner.execution.run_verification import RunVerification, verify_run
 from planner.kinematics.configuration import Configuration
 from planner.planning.planners import PLANNERS
 from planner.scanning.latched_run import LatchedRun
-from planner.scanning.scan_run import Planned, ScanOptions, TableAtPort, check_motion, run_on_table
-from planner.table.velocity_profile import MotionCommand, ReferenceState, time_to_rest_s
+from planner.scanning.scan_run import ScanOptions, TableAtPort, check_motion, run_on_table
 from protocol.progress import Progress
+from protocol.trapezoid import MotionCommand, ReferenceState, time_to_rest_s
 
 # Share of the map's minimum clearance that has to be kept between strips.
 _CLEARANCE_SHARE = 0.5
@@ -66,7 +66,7 @@ class TableCarrier:
         surroundings: Surroundings,
         table: TableAtPort,
         options: ScanOptions,
-        measure: Callable[[Planned, LatchedRun], Returned],
+        measure: Callable[[RunInput, LatchedRun], Returned],
     ) -> None:
         """Take over a table at angle 0; the arm stands in a clear posture, before the predefined path too.
 
@@ -114,15 +114,13 @@ class TableCarrier:
         except PlannerError as error:
             return str(error)
         self._stand_at(end)
-        self.scanned.append(
-            ScannedStrip(planned, transfer, run, verified(self._surroundings.name, planned, run.record))
-        )
+        self.scanned.append(ScannedStrip(planned, transfer, run, verified(planned.planned, run.record)))
         returned = self._measure(planned.planned, run)
         if run.failure is not None:
             raise CarrierError(f"{strip.name}: {run.failure}")
         return returned
 
-    def scan_path(self, path: Planned, progress: Progress | None) -> Returned:
+    def scan_path(self, path: RunInput, progress: Progress | None) -> Returned:
         """Scan a predefined path that was checked, as any scan, and return what the probe returned.
 
         Raises:
@@ -151,12 +149,12 @@ class TableCarrier:
             self._plans[strip] = plan_strip(self._surroundings, strip, solid, planner, self._configurations, angles)
         return self._plans[strip]
 
-    def _ends(self, planned: Planned) -> tuple[Stance, Stance]:
+    def _ends(self, planned: RunInput) -> tuple[Stance, Stance]:
         """Return how arm and table stand before a motion, and after it."""
         joints = self._surroundings.cell.arm.joints(planned.joints_deg[[0, -1]])
         configuration = Configuration.parse(planned.plan.configuration)
         return (
-            Stance(joints[0], planned.motion.start_deg, configuration),
+            Stance(joints[0], planned.motion().start_deg, configuration),
             Stance(joints[1], float(planned.plan.angles_deg[-1]), configuration),
         )
 
@@ -181,11 +179,10 @@ class TableCarrier:
         return max(arm_s, time_to_rest_s(ReferenceState(from_deg, 0.0), turn))
 
 
-def verified(name: str, planned: StripPlan, record: Record) -> RunVerification:
+def verified(planned: RunInput, record: Record) -> RunVerification:
     """Return what the motion of a strip came to, from readings of the position and looks into the table.
 
     Latches are those of the probe's own triggers and not of the strip's poses, so they are left to the alignment.
     """
     seen = [each._replace(column=None) for each in record.observations if each.source != "L"]
-    run_input = RunInput(name, planned.plan, planned.problem, planned.joints_deg, {})
-    return verify_run(run_input, planned.motion, replace(record, observations=seen), lead_s=0.0)
+    return verify_run(planned, planned.motion(), replace(record, observations=seen), lead_s=0.0)

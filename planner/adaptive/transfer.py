@@ -22,7 +22,7 @@ from planner.kinematics.configuration import Configuration
 from planner.kinematics.inverse_kinematics import inverse_kinematics
 from planner.reasons import Reason
 from planner.table.motion import Limits
-from planner.table.velocity_profile import MotionCommand, ReferenceState, time_to_rest_s
+from protocol.trapezoid import MotionCommand, ReferenceState, time_to_rest_s
 
 SPEED_SHARE = 0.5
 """Of the joints' maximum speeds, that the arm uses between strips: it starts, stops, and rounds no corner."""

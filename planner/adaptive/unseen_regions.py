@@ -16,7 +16,7 @@ from planner.scanning.coverage import Coverage
 from planner.scanning.probe import Sight
 
 # Neighbors are at most so many mean spacings apart: a place then has a dozen of them, if all are unseen.
-_NEIGHBOURS = 2.0
+_NEIGHBORS = 2.0
 
 
 class Region(NamedTuple):
@@ -24,14 +24,14 @@ class Region(NamedTuple):
 
     Attributes:
         area_mm2: Its area.
-        centre_W: `(3,)` the mean of its places, in frame W, in mm.
+        center_W: `(3,)` the mean of its places, in frame W, in mm.
         normal_W: `(3,)` the mean of their outward normals.
         reason: The condition that fails in most of it.
         can_be_seen_mm2: The area that some strip would see.
     """
 
     area_mm2: float
-    centre_W: FloatArray
+    center_W: FloatArray
     normal_W: FloatArray
     reason: Sight
     can_be_seen_mm2: float
@@ -48,7 +48,7 @@ def unseen_regions(coverage: Coverage, visible: BoolArray, area_mm2: float) -> l
     unseen = np.flatnonzero(coverage.codes != Sight.SEEN)
     share_mm2 = area_mm2 / len(coverage.codes)
     points, normals = coverage.points[unseen], coverage.normals[unseen]
-    numbers = connected(points, normals, _NEIGHBOURS * np.sqrt(share_mm2))
+    numbers = connected(points, normals, _NEIGHBORS * np.sqrt(share_mm2))
     regions = [
         Region(
             share_mm2 * len(own),

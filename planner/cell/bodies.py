@@ -7,7 +7,8 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.cell.cell import Probe
-from planner.toml_table import TomlTable
+from planner.errors import ScanFileError
+from protocol.toml_table import TomlTable
 
 _SHIPPED = Path(__file__).parents[1] / "bodies"
 
@@ -96,7 +97,7 @@ def load_bodies(probe: Probe, T_FS: FloatArray, file: Path | str = "viper_s650")
         ScanFileError: The file cannot be read, or a key is missing, unknown or of the wrong type.
     """
     shipped = _SHIPPED / f"{file}.toml"
-    top = TomlTable.load(shipped if shipped.is_file() else Path(file))
+    top = TomlTable.load(shipped if shipped.is_file() else Path(file), ScanFileError)
     parts = [
         _read_part(table, name, link, frame)
         for name, (link, frame) in _ARM_PARTS.items()

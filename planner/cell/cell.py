@@ -86,7 +86,3 @@ class Cell:
     def location_factors(self, T_WS: FloatArray) -> FloatArray:
         """Return T_TW T_L inv(T_FS) `(n, 4, 4)` for scan locations `(n, 4, 4)`: the right factor of every goal."""
         return self.T_TW @ T_WS @ rigid_inverse(self.T_FS)
-
-    def goal_flange_poses(self, T_WS: FloatArray, angles_deg: FloatArray) -> FloatArray:
-        """Return T_BF = T_BT Rz(theta) T_TW T_L inv(T_FS) `(n, m, 4, 4)` for n locations and m table angles."""
-        return self.table_factors(angles_deg)[np.newaxis] @ self.location_factors(T_WS)[:, np.newaxis]

@@ -6,13 +6,11 @@ is fine, so it counts only where something blocks it.
 """
 
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from planner.arrays import FloatArray, IndexArray
-from planner.cell.bodies import FLANGE_FRAME
 from planner.cell.collision_model import (
     END,
     FRAME,
@@ -24,15 +22,12 @@ from planner.cell.collision_model import (
     START,
     THIRD,
     UPPER,
-    CollisionModel,
-    base_in_obstacles,
 )
 from planner.geometry.box_distance import FIELD, box_distance_bound
 from planner.geometry.capsule import segment_distance
 from planner.geometry.signed_distance_field import field_distance
 from planner.geometry.solid import BOX, solid_distance
 from planner.kernel import kernel
-from planner.kinematics.arm import Arm, link_frames
 
 ARM_FRAMES = 4
 """The frames from the base's on that bodies move with; none moves with the wrist's, and then comes the flange's."""
@@ -42,46 +37,6 @@ ARM_FRAMES = 4
 _MIDDLE, _HALF_LENGTH, _THIRD = 6, 9, 10
 PLACED = 13
 """Columns of the table of placed bodies."""
-
-
-class Clearances(NamedTuple):
-    """The clearance `(n,)` in mm, and the nearest pair `(n,)` as an index into the model's pairs."""
-
-    clearance_mm: FloatArray
-    pair: IndexArray
-
-
-def clearances(
-    model: CollisionModel, arm: Arm, joints: FloatArray, table_angles_deg: FloatArray, stand_off_mm: float
-) -> Clearances:
-    """Return the clearance of each pose, without a bound.
-
-    Args:
-        model: What can collide.
-        arm: The arm.
-        joints: `(n, 6)`, in radians.
-        table_angles_deg: `(n,)`.
-        stand_off_mm: The probe's distance from the surface along its beam.
-
-    Raises:
-        ValueError: A joint or an angle is not a finite number.
-    """
-    if not (np.isfinite(joints).all() and np.isfinite(table_angles_deg).all()):
-        raise ValueError("a joint or a table angle is not a finite number; only reached poses have a clearance")
-    clearance_mm, pair = np.empty(len(joints)), np.empty(len(joints), dtype=np.int64)
-    _clearance_of_each(
-        arm.table,
-        np.ascontiguousarray(joints),
-        model.beam_mm(stand_off_mm),
-        model.pairs,
-        model.bodies,
-        model.obstacles,
-        *model.field,
-        base_in_obstacles(model, table_angles_deg),
-        clearance_mm,
-        pair,
-    )
-    return Clearances(clearance_mm, pair)
 
 
 # Kernels take numbers and arrays, not the model: each array that is fetched from a tuple, and each view of an array,
@@ -321,19 +276,3 @@ def _in_frame(
         frames[angle, i, 1, 0] * x + frames[angle, i, 1, 1] * y + frames[angle, i, 1, 2] * z + frames[angle, i, 1, 3],
         frames[angle, i, 2, 0] * x + frames[angle, i, 2, 1] * y + frames[angle, i, 2, 2] * z + frames[angle, i, 2, 3],
     )
-
-
-@kernel
-def _clearance_of_each(
-    arm: FloatArray, joints: FloatArray, beam_mm: float, pairs: IndexArray, bodies: FloatArray, obstacles: FloatArray,
-    field_values: npt.NDArray[np.float32], field_levels: FloatArray,
-    obstacle_frames: FloatArray, clearance_mm: FloatArray, pair: IndexArray,
-) -> None:  # fmt: skip
-    frames, placed = np.empty((7, 3, 4)), np.empty((len(bodies), PLACED))
-    for i in range(len(joints)):
-        link_frames(arm, joints[i], frames)
-        place_bodies(bodies, frames, beam_mm, 0, FLANGE_FRAME, placed)
-        clearance_mm[i], pair[i] = nearest_pair(
-            pairs, bodies, obstacles, field_values, field_levels,
-            placed, obstacle_frames, i, 0, len(pairs), np.inf,
-        )  # fmt: skip

@@ -56,7 +56,7 @@ class StripLayout:
         """Return the distance of neighboring strips."""
         return line_width_mm * (1.0 - self.overlap)
 
-    def strip_centres(self, span_mm: float, line_width_mm: float) -> FloatArray:
+    def strip_centers(self, span_mm: float, line_width_mm: float) -> FloatArray:
         """Return the evenly spread middles of the fewest strips that cover a span about 0."""
         beyond = max(0.0, span_mm - line_width_mm)
         count = 1 + strip_count(beyond, self.pitch_mm(line_width_mm))
@@ -133,7 +133,7 @@ def cylinder_helix(cylinder: Cylinder, probe: Probe, layout: StripLayout) -> Flo
 def _ring_heights(cylinder: Cylinder, probe: Probe, layout: StripLayout) -> FloatArray:
     bottom = min(layout.bottom_margin_mm, 0.5 * cylinder.height_mm)
     lower = max(0.0, bottom - 0.5 * probe.line_width_mm)
-    middles = layout.strip_centres(cylinder.height_mm - lower, probe.line_width_mm)
+    middles = layout.strip_centers(cylinder.height_mm - lower, probe.line_width_mm)
     return middles + 0.5 * (cylinder.height_mm + lower)
 
 
@@ -204,7 +204,7 @@ FloorCorner = tuple[float, float, float, float]
 
 def _strips(floor: Floor, probe: Probe, layout: StripLayout) -> list[FloorCorner]:
     ends = (-0.5 * floor.length_mm, 0.5 * floor.length_mm)
-    middles = layout.strip_centres(floor.width_mm, probe.line_width_mm)
+    middles = layout.strip_centers(floor.width_mm, probe.line_width_mm)
     return [
         (x, float(y), 0.0, 0.0) for strip, y in enumerate(middles) for x in (ends if strip % 2 == 0 else ends[::-1])
     ]

@@ -20,16 +20,16 @@ from planner.cell.mesh_path import CLASS_OF_PATTERN, class_of, measured, mesh_wa
 from planner.cell.patterns import PATTERNS, StripLayout
 from planner.cell.scan_path import ScanPath, at_scan_speed, load_scan_path
 from planner.cell.workpiece import CLASSES, Workpiece
-from planner.defaults import MILLIMETRES, SCANS, shipped_scans
+from planner.defaults import MILLIMETERS, SCANS, shipped_scans
 from planner.errors import PlannerError, ScanFileError, WorkpieceError
 from planner.geometry.mesh import load_mesh, radius_about_axis_mm, size_fault
 from planner.kinematics.arm import Arm, shipped_arms
 from planner.kinematics.value import ValueFunction
 from planner.table.cost import Weights, costs_overflow, default_weights
 from planner.table.motion import Limits
-from planner.toml_table import TomlTable
 from protocol.data_file import did_you_mean
 from protocol.progress import Progress
+from protocol.toml_table import TomlTable
 
 DEFAULT_ARM = "viper_s650"
 ADAPTIVE = "adaptive"
@@ -104,7 +104,7 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progre
     file = shipped if shipped.is_file() else Path(scan)
     if not file.is_file():
         raise ScanFileError(f"{scan} is neither a scan file nor one of the shipped scans {', '.join(shipped_scans())}")
-    top = TomlTable.load(file)
+    top = TomlTable.load(file, ScanFileError)
     top.only("cell", "workpiece", "path", "value", "limits", "weights")
     with _named(file):
         cell, bodies = _read_cell(top.table("cell"), file.parent)
@@ -228,7 +228,7 @@ def _read_workpiece(
     if "mesh" in section:
         mesh_file = folder / section.text("mesh")
         kind = section.choice("class", (*CLASSES, "other"), "other")
-        unit = section.choice("unit", tuple(MILLIMETRES)) if "unit" in section else None
+        unit = section.choice("unit", tuple(MILLIMETERS)) if "unit" in section else None
         section.finish()
         mesh = load_mesh(mesh_file, unit, say, progress)
         return (measured(mesh, kind, cell.T_TW)[0] if kind != "other" else None), mesh, mesh_file

@@ -51,7 +51,7 @@ class Part:
     Attributes:
         mesh: Its surface in the frame of its file, in mm.
         file: Where it was read.
-        unit: The unit of the file, one of `MILLIMETRES`.
+        unit: The unit of the file, one of `MILLIMETERS`.
         up: The axis of the file that points up, one of `TURN_TO_UP`.
     """
 
@@ -158,7 +158,7 @@ class Draft:
             ],
             "path": [
                 ("pattern", json.dumps(self.pattern), f"or {', '.join(sorted({*CLASS_OF_PATTERN} - {self.pattern}))}"),
-                ("overlap", f"{StripLayout.overlap:g}", "share of the line that neighbouring strips have in common"),
+                ("overlap", f"{StripLayout.overlap:g}", "share of the line that neighboring strips have in common"),
                 *((name, f"{value:g}", _KEYS[name]) for name, value in self.keys),
                 ("scan_speed_mm_s", f"{self.speed_mm_s:g}", "speed of the line over the surface"),
                 ("time_step_s", f"{self.step_s:g}", "time from one location to the next"),

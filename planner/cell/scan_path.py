@@ -117,7 +117,7 @@ def load_scan_path(file: Path, step_s: float) -> ScanPath:
         raise PathError(str(error)) from error
     if len(rows) > MOST_LOCATIONS:
         raise PathError(f"{file}: holds {len(rows):,} poses; at most {MOST_LOCATIONS:,} are allowed")
-    poses = [_pose(f"{file}: pose {i}", row) for i, row in enumerate(rows, 1)]
+    poses = [pose_of(f"{file}: pose {i}", row) for i, row in enumerate(rows, 1)]
     try:
         return ScanPath(np.array(poses).reshape(-1, 4, 4), step_s)
     except PathError as error:
@@ -153,7 +153,12 @@ def _rows_of_json(file: Path) -> list[list[float]]:
         raise PathError(f"{file}: each pose must be 6 numbers, or a 4 x 4 matrix of numbers") from None
 
 
-def _pose(where: str, row: list[float]) -> FloatArray:
+def pose_of(where: str, row: list[float]) -> FloatArray:
+    """Return the pose (4, 4) of six or sixteen numbers.
+
+    Raises:
+        PathError: They are not a pose; the message begins with `where`.
+    """
     if len(row) not in (6, 16):
         raise PathError(
             f"{where} has {len(row)} numbers; allowed are 6 (x y z yaw pitch roll) or the 16 of a 4 x 4 matrix"

@@ -32,14 +32,14 @@ def _suspects(scan: Scan) -> Iterator[str]:
     ):  # fmt: skip
         length_mm = float(np.linalg.norm(T[:3, 3]))
         if 0.0 < length_mm < _SHORT_MM:
-            yield f"{key} is {length_mm:.3g} mm long: is it in metres"
+            yield f"{key} is {length_mm:.3g} mm long: is it in meters"
         turn_deg = _turns_deg(T[np.newaxis])[0]
         if turn_deg > 0.1 and abs(turn_deg / _QUARTER_RAD - round(turn_deg / _QUARTER_RAD)) < _NEAR:
             yield f"{key} turns by {turn_deg:.4f} deg: is it in radians"
     positions = scan.path.T_WS[:, :3, 3]
     reach_mm = float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max())
     if reach_mm < _SHORT_MM and reach_mm < 0.1 * float(np.max(scan.mesh.extents)):
-        yield f"all poses of the path are within {reach_mm:.3g} mm: is it in metres"
+        yield f"all poses of the path are within {reach_mm:.3g} mm: is it in meters"
     turns_deg = _turns_deg(scan.path.T_WS)
     if 0.0 < turns_deg.max() < _ALIKE_DEG:
         yield f"no pose of the path turns by more than {turns_deg.max():.3g} deg: is it in radians"

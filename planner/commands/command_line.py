@@ -10,12 +10,14 @@ from planner.defaults import (
     DEFAULT_PLANNER,
     LAG_S,
     LEAD_S,
-    MILLIMETRES,
+    MILLIMETERS,
     MOST_STRIPS,
     PART_CLASSES,
     PATTERN_NAMES,
     PLANNER_NAMES,
     PROFILES_HZ,
+    RAY_SHOOTING,
+    RECEDING,
     RUN_ON_DEG,
     SHARE_SEEN,
     TOLERANCE_DEG,
@@ -42,6 +44,7 @@ def parser() -> Parser:
     _add_map(commands)
     _add_plan(commands)
     _add_run(commands)
+    _add_track(commands)
     _add_scan(commands)
     _add_show(commands)
     _add_new_scan(commands)
@@ -93,40 +96,50 @@ def _add_run(commands: "argparse._SubParsersAction[Parser]") -> None:
         epilog="example: python -m planner run build/cylinder/plan.json --port /dev/ttyUSB0 --out build/cylinder/run",
     )
     parser.add_argument("plan", metavar="PLAN.json", type=Path, help="a plan from python -m planner plan")
-    parser.add_argument(
-        "--port",
-        metavar="URL",
-        required=True,
-        help="a device, socket://HOST:PORT, or emulator:// for a simulated table",
-    )
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, required=True, help="folder for run.json, run.csv and run.png"
-    )
     parser.add_argument("--map", metavar="FILE", type=Path, help="the plan's map (default: map.npz beside the plan)")
-    _add_wire(parser)
+    _add_run_options(parser)
+
+
+def _add_track(commands: "argparse._SubParsersAction[Parser]") -> None:
+    parser = commands.add_parser(
+        "track",
+        help="plan the table while it moves, as scan locations become known",
+        description="Decide the table's motion step by step from the locations in view, stream it to the table, and"
+        " verify it. The table can come to rest within the view at any moment. Exit status 1 when the motion deviated"
+        " from what was decided.",
+        epilog="example: python -m planner track mould --port emulator:// --view 30 --out build/mould-track",
+    )
+    _add_scan_option(parser)
     parser.add_argument(
-        "--timeout",
-        type=positive_number,
-        default=1.0,
-        metavar="S",
-        help="timeout of a reply in s (default: 1)",
+        "--poses",
+        metavar="SOURCE",
+        help="locations from a program in place of the scan's path, one JSON line each: - for stdin, or"
+        " tcp://127.0.0.1:PORT to listen there",
     )
     parser.add_argument(
-        "--lead", type=number(-1.0, 1.0), default=LEAD_S, metavar="S",
-        help="send commands ahead by the encoder's lag behind the reference: 0.0035 for the emulator (default: 0)",
-    )  # fmt: skip
-    _add_lag(parser)
+        "--planner",
+        choices=(RECEDING, RAY_SHOOTING),
+        default=RECEDING,
+        help="who decides each step (default: %(default)s)",
+    )
     parser.add_argument(
-        "--tolerance", type=positive_number, default=TOLERANCE_DEG, metavar="DEG",
-        help="allowed encoder deviation at a location in deg (default: %(default)s)",
-    )  # fmt: skip
-    _add_run_on(parser)
+        "--view",
+        type=whole_number(1, 1000),
+        default=50,
+        metavar="COLUMNS",
+        help="locations that are known ahead of the table, at most (default: %(default)s)",
+    )
+    _add_map_option(parser, configuration="best")
     parser.add_argument(
-        "--arm-away",
+        "--reconfigure",
         action="store_true",
-        help="no collision check on the approach: the arm is drawn back until the table is at the start",
+        help="let a pause change the arm's configuration where the path goes on in no other way",
     )
-    _add_emulator(parser)
+    parser.add_argument(
+        "--wait", type=positive_number, default=60.0, metavar="S",
+        help="how long to wait for a location in s (default: %(default)g)",
+    )  # fmt: skip
+    _add_run_options(parser)
 
 
 def _add_scan(commands: "argparse._SubParsersAction[Parser]") -> None:
@@ -140,7 +153,7 @@ def _add_scan(commands: "argparse._SubParsersAction[Parser]") -> None:
     )
     _add_scan_option(parser)
     parser.add_argument("--mesh", type=Path, metavar="FILE", help="replace the workpiece by this mesh")
-    parser.add_argument("--unit", choices=tuple(MILLIMETRES), help="unit of length in --mesh (default: mm)")
+    parser.add_argument("--unit", choices=tuple(MILLIMETERS), help="unit of length in --mesh (default: mm)")
     parser.add_argument(
         "--port", metavar="URL", default="emulator://",
         help="emulator:// for a table in simulated time (the default), or an emulator's port with --control",
@@ -210,7 +223,7 @@ def _add_new_scan(commands: "argparse._SubParsersAction[Parser]") -> None:
         epilog="example: python -m planner new-scan part.stl --out part.toml",
     )
     parser.add_argument("mesh", metavar="MESH", type=Path, help="an STL, PLY or OBJ file with a closed surface")
-    parser.add_argument("--unit", choices=tuple(MILLIMETRES), help="unit of length in the file (default: mm)")
+    parser.add_argument("--unit", choices=tuple(MILLIMETERS), help="unit of length in the file (default: mm)")
     parser.add_argument(
         "--up",
         choices=AXES,
@@ -261,6 +274,43 @@ def _add_map_option(parser: argparse.ArgumentParser, configuration: str) -> None
         metavar="COUNT",
         help="table angles over one turn (default: %(default)s)",
     )
+
+
+def _add_run_options(parser: argparse.ArgumentParser) -> None:
+    """Add how a motion is run on a table, and where it is recorded."""
+    parser.add_argument(
+        "--port",
+        metavar="URL",
+        required=True,
+        help="a device, socket://HOST:PORT, or emulator:// for a simulated table",
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, required=True, help="folder for run.json, run.csv and run.png"
+    )
+    _add_wire(parser)
+    parser.add_argument(
+        "--timeout",
+        type=positive_number,
+        default=1.0,
+        metavar="S",
+        help="timeout of a reply in s (default: 1)",
+    )
+    parser.add_argument(
+        "--lead", type=number(-1.0, 1.0), default=LEAD_S, metavar="S",
+        help="send commands ahead by the encoder's lag behind the reference: 0.0035 for the emulator (default: 0)",
+    )  # fmt: skip
+    _add_lag(parser)
+    parser.add_argument(
+        "--tolerance", type=positive_number, default=TOLERANCE_DEG, metavar="DEG",
+        help="allowed encoder deviation at a location in deg (default: %(default)s)",
+    )  # fmt: skip
+    _add_run_on(parser)
+    parser.add_argument(
+        "--arm-away",
+        action="store_true",
+        help="no collision check on the approach: the arm is drawn back until the table is at the start",
+    )
+    _add_emulator(parser)
 
 
 def _add_wire(parser: argparse.ArgumentParser) -> None:

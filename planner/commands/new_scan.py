@@ -77,9 +77,10 @@ def first_that_plans(part: Part, kind: str | None, pattern: str | None, name: st
             lambda label: progress_line(label, sys.stderr),
             compiled=DEFAULT_PLANNER,
         )
-        if plans.best is not None and has_room(*plans.best):
+        best = plans.best
+        if best is not None and has_room(best.problem, best.plan, best.arm):
             return Drafted(draft, plans)
-        reason = plans.comparison.refusal if plans.best is None else "its plan touches what is forbidden"
+        reason = plans.comparison.refusal if best is None else "its plan touches what is forbidden"
         reasons.append(f"{draft.pattern}{_layout(draft)}: {reason}")
     tried = "; ".join(reasons) or "no pattern meets the part"
     raise WorkpieceError(
@@ -108,7 +109,7 @@ def summary(drafted: Drafted, out: Path) -> str:
     """Return what was written, what was assumed, and what to do next, for people."""
     draft, part = drafted.draft, drafted.draft.part
     assert drafted.plans.best is not None
-    problem, plan, _ = drafted.plans.best
+    problem, plan = drafted.plans.best.problem, drafted.plans.best.plan
     x, y, z = (float(side) for side in part.mesh.extents)
     cell, placed = part.cell, part.placement
     warning = beam_warning(draft.path().T_WS, part.mesh, cell.probe)

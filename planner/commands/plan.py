@@ -9,20 +9,19 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.cell.scan import Scan, load_scan
+from planner.cell.scan import load_scan
 from planner.commands import options
 from planner.errors import PlannerError
-from planner.execution.run_file import PLAN_FILE, RUN_RESULTS
-from planner.kinematics.configuration import Configuration
-from planner.map.map_file import MAP_FILE, save_maps
+from planner.execution.run_file import RUN_RESULTS
+from planner.map.map_file import MAP_FILE
 from planner.planning.arm_motion import ArmMotion, arm_follows
 from planner.planning.arm_plots import plot_arm
 from planner.planning.own_planners import planner_named, planner_names
 from planner.planning.plan import NoPlan, Outcome, Plan, Planner
-from planner.planning.plan_file import plan_document, save_plan
+from planner.planning.plan_file import PLAN_FILE
 from planner.planning.plan_plots import plot_plan
 from planner.planning.problem import Problem
-from planner.planning.scan_planning import plan_scan
+from planner.planning.scan_planning import PlannedScan, plan_scan
 from planner.planning.smoothing import smooth
 from planner.planning.verification import verify
 from planner.plug_ins import PlugInError
@@ -50,16 +49,16 @@ def run(arguments: argparse.Namespace) -> int:
     )
     for label, outcome in plans.comparison.outcomes.items():
         sys.stderr.write(configuration_line(label, outcome))
-    if plans.best is None:
+    planned = plans.best
+    if planned is None:
         sys.stdout.write(f"{plans.comparison.why_no_plan(scan)}\n")
         return _NO_PLAN
-    chosen, plan, motion = plans.best
-    _write(arguments.out, scan, chosen, plan, motion)
-    sys.stdout.write(report(scan, chosen, plan, motion))
+    _write(arguments.out, planned)
+    sys.stdout.write(report(planned))
     if arguments.compare:
-        start = replace(chosen, start_angle_deg=float(plan.angles_deg[0]))
+        start = replace(planned.problem, start_angle_deg=float(planned.plan.angles_deg[0]))
         sys.stdout.write(comparison_table(start, {name: compared(name, start) for name in planner_names()}))
-    return 0 if motion.step is None and verify(chosen, plan).is_executable else _NO_PLAN
+    return 0 if planned.is_executable else _NO_PLAN
 
 
 def smoothed(planner: Planner) -> Planner:
@@ -94,11 +93,12 @@ def configuration_line(label: str, outcome: Outcome) -> str:
     return f"{label:20} {outcome.reason if isinstance(outcome, NoPlan) else f'cost {outcome.cost.total:.3f}'}\n"
 
 
-def report(scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -> str:
+def report(planned: PlannedScan) -> str:
     """Return cost, time and margins of a plan, for people."""
-    checked, cost = verify(problem, plan), plan.cost
+    problem, plan, checked = planned.problem, planned.plan, planned.verification
+    cost = plan.cost
     lines = [
-        f"{scan.name}: {plan.planner}, {plan.configuration}, {problem.map.location_count} locations, "
+        f"{planned.scan.name}: {plan.planner}, {plan.configuration}, {problem.map.location_count} locations, "
         f"{problem.step_count * problem.step_s:g} s",
         f"cost          {cost.total:.4f} = acceleration {cost.acceleration:.4f} + speed {cost.speed:.4f} "
         f"+ value {cost.value:.4f} + pauses {cost.pauses:.4f}",
@@ -107,8 +107,8 @@ def report(scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -> str:
         f"margins       {checked.clearance_deg:.2f} deg to the nearest forbidden sample, "
         f"{checked.speed_margin_deg_s:.2f} deg/s to the speed limit, "
         f"{checked.acceleration_margin_deg_s2:.2f} deg/s2 to the acceleration limit",
-        f"arm           {_arm_verdict(motion)}",
-        *_arm_lines(motion),
+        f"arm           {_arm_verdict(planned.arm)}",
+        *_arm_lines(planned.arm),
     ]
     return "\n".join(lines) + "\n"
 
@@ -162,13 +162,11 @@ def comparison_table(problem: Problem, outcomes: Mapping[str, Outcome | PlugInEr
     return "\n".join(lines) + "\n"
 
 
-def _write(out: Path, scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -> None:
+def _write(out: Path, planned: PlannedScan) -> None:
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        save_plan(out / PLAN_FILE, plan_document(scan, problem, plan, motion))
-        save_maps(out / MAP_FILE, {Configuration.parse(plan.configuration): problem.map})
-        title = f"{scan.name}   {plan.configuration}   {plan.planner}"
-        plot_plan(problem, plan, title, out / "plan.png")
-        plot_arm(motion, title, out / "arm.png")
+        planned.save(out)
+        title = f"{planned.scan.name}   {planned.plan.configuration}   {planned.plan.planner}"
+        plot_plan(planned.problem, planned.plan, title, out / "plan.png")
+        plot_arm(planned.arm, title, out / "arm.png")
     except OSError as error:
         raise PlannerError(f"{out}: the plan cannot be written there ({error.strerror or error})") from error

@@ -17,19 +17,7 @@ _DEVIATED, _NOT_RUN = 1, 2
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the plan, write what happened, print the verdict, and return the exit status."""
-    asked = RunOptions(
-        port=options.fresh_table(arguments.port, decimals=arguments.decimals),
-        baud=arguments.baud,
-        decimals=arguments.decimals,
-        timeout_s=arguments.timeout,
-        lead_s=arguments.lead,
-        run_on_deg=arguments.run_on,
-        lag_s=arguments.lag,
-        tolerance_deg=arguments.tolerance,
-        control=arguments.control,
-        arm_is_away=arguments.arm_away,
-        time_scale=arguments.time_scale,
-    )
+    asked = run_options(arguments)
     show = progress_line("run", sys.stderr)
     try:
         checked, duration = run_plan(arguments.plan, arguments.out, asked, arguments.map, show)
@@ -42,9 +30,31 @@ def run(arguments: argparse.Namespace) -> int:
     sys.stderr.write(f"{duration}\n")
     if checked.failure is not None:
         sys.stderr.write(f"what was recorded until then is in {arguments.out}\n")
+    return status_of(checked)
+
+
+def status_of(checked: RunVerification) -> int:
+    """Return the exit status that a run comes to."""
     if checked.is_verified:
         return 0
     return _DEVIATED if checked.failure is None or checked.has_strayed else _NOT_RUN
+
+
+def run_options(arguments: argparse.Namespace) -> RunOptions:
+    """Return how a motion is run, from the options of a command."""
+    return RunOptions(
+        port=options.fresh_table(arguments.port, decimals=arguments.decimals),
+        baud=arguments.baud,
+        decimals=arguments.decimals,
+        timeout_s=arguments.timeout,
+        lead_s=arguments.lead,
+        run_on_deg=arguments.run_on,
+        lag_s=arguments.lag,
+        tolerance_deg=arguments.tolerance,
+        control=arguments.control,
+        arm_is_away=arguments.arm_away,
+        time_scale=arguments.time_scale,
+    )
 
 
 def summary(checked: RunVerification) -> str:

@@ -1,4 +1,4 @@
-"""`python -m planner scan`: carry a scan out with a simulated probe, and account for the error of its cloud."""
+"""`python -m planner scan`: carry a scan out with a simulated probe, and compute the error budget of its cloud."""
 
 import argparse
 import sys
@@ -97,8 +97,8 @@ def _check_surface_file(file: Path) -> None:
 
 def summary(scanned: Scanned) -> str:
     """Return what a scan came to, for people."""
-    run, accounted = scanned.run, scanned.account
-    mean, sigma, within, greatest = (f"{1e3 * value:.1f}" for value in accounted.distances)
+    run, budget = scanned.run, scanned.budget
+    mean, sigma, within, greatest = (f"{1e3 * value:.1f}" for value in budget.distances)
     shares = [
         (
             str(part),
@@ -106,17 +106,17 @@ def summary(scanned: Scanned) -> str:
             f"{1e3 * share.across_mm:.2f}",
             f"{1e3 * share.without_mm:.2f}",
         )
-        for part, share in accounted.parts.items()
+        for part, share in budget.parts.items()
     ]
-    total = accounted.total
+    total = budget.total
     shares.append(("all together", f"{1e3 * total.displacement_mm:.2f}", f"{1e3 * total.across_mm:.2f}", ""))
-    shares.append(("all switched off", f"{1e3 * accounted.none_mm:.1g}", "", ""))
+    shares.append(("all switched off", f"{1e3 * budget.none_mm:.1g}", "", ""))
     lines = [
         f"{scanned.scan.name}: {verdict_of(scanned)}",
         f"profiles   {run.triggers} taken, {len(run.dropped)} dropped because a latch was missing",
         f"dead line  {scanned.dead_line}",
-        f"distance   mean {mean}, sigma {sigma}, 95 % within {within}, greatest {greatest} micrometres",
-        f"{'rms, in micrometres':24} {'displacement':>12} {'across':>8} {'without':>8}",
+        f"distance   mean {mean}, sigma {sigma}, 95 % within {within}, greatest {greatest} micrometers",
+        f"{'rms, in micrometers':24} {'displacement':>12} {'across':>8} {'without':>8}",
         *(f"  {name:22} {alone:>12} {across:>8} {without:>8}".rstrip() for name, alone, across, without in shares),
     ]
     return "\n".join(lines) + "\n"

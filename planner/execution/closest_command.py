@@ -17,8 +17,8 @@ from itertools import chain
 from typing import NamedTuple
 
 from planner.execution.run_on import least_rate
-from planner.table.velocity_profile import MotionCommand, ReferenceState, advance
 from planner.table.wire import Grid
+from protocol.trapezoid import MotionCommand, ReferenceState, advance
 
 # A speed below this counts as standing: it is what additions leave of zero.
 STANDING_DEG_S = 1e-6

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.execution.free_way import is_free
+from planner.execution.clear_path import is_clear
 from planner.execution.run_record import Record, Sent
 from planner.execution.table_motion import Leg, Phase, TableMotion
 from planner.map.config_map import ConfigurationMap
-from planner.table.velocity_profile import ReferenceState, advance, way_to_rest_deg
+from protocol.trapezoid import ReferenceState, advance, way_to_rest_deg
 
 MOMENT_S = 0.02
 """From one moment to the next."""
@@ -60,7 +60,7 @@ def judge_dead_line(configuration_map: ConfigurationMap, motion: TableMotion, re
         moments += 1
         longest_deg = max(longest_deg, highest_deg - at_deg, at_deg - lowest_deg)
         leg = motion.leg_at(time_s)
-        if not all(is_free(configuration_map, location, lowest_deg, highest_deg) for location in _arm_at(leg)):
+        if not all(is_clear(configuration_map, location, lowest_deg, highest_deg) for location in _arm_at(leg)):
             forbidden.append((time_s, leg.column))
     first_s, first_location = forbidden[0] if forbidden else (None, None)
     return DeadLine(longest_deg, moments, len(forbidden), first_s, first_location)

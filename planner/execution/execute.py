@@ -6,22 +6,22 @@ happens.
 """
 
 from contextlib import suppress
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from planner.defaults import LAG_S, LEAD_S, RUN_ON_DEG
 from planner.errors import PlannerError
-from planner.execution.run_record import Record, Sent
+from planner.execution.run_record import Correction, Record, Sent
 from planner.execution.stream import TimedCommand
 from planner.execution.stream_correction import CorrectedStream
-from planner.execution.table_motion import TableMotion
+from planner.execution.table_motion import MotionInTime, TableMotion
 from planner.execution.table_watch import StrayedError, TableWatch
 from planner.table.motion import Limits
-from planner.table.velocity_profile import MotionCommand, ReferenceState, time_to_rest_s
 from planner.table.wire import Grid, Wire, command_line, exchanges_s
 from protocol import ArrivalTimeout, CommandRefused, TableClient, TableError, Verb
-from protocol.bench import InsideView
+from protocol.bench import GroundTruth
 from protocol.interrupts import signals_wait
 from protocol.progress import Progress
+from protocol.trapezoid import MotionCommand, ReferenceState, time_to_rest_s
 
 # Between the last reading and the next command: what the operating system may take.
 _SLACK_S = 0.005
@@ -68,13 +68,36 @@ class Settings(NamedTuple):
         return self.lag_s - self.lead_s
 
 
+class Commands(Protocol):
+    """The commands of a motion, one after the other: of a plan, or decided as they come due."""
+
+    @property
+    def corrections(self) -> list[Correction]:
+        """Where the stream was changed for drift; the list grows while the motion runs."""
+
+    def next(self) -> TimedCommand | None:
+        """Return the next command; None when all are sent."""
+
+    def begin_s(self, wire: Wire, latched: MotionCommand | None) -> float | None:
+        """Return when the next command has to be asked for, without lead; None when all are sent."""
+
+    def latest_s(self, timed: TimedCommand) -> float:
+        """Return how late a command may be sent."""
+
+    def sent(self, timed: TimedCommand, late_s: float) -> None:
+        """Take note that the next command was sent, and how late."""
+
+    def encoder_read(self, time_s: float, angle_deg: float) -> None:
+        """Take note of where the encoder was at a time that is known for certain."""
+
+
 def execute(
     table: TableClient,
     motion: TableMotion,
     limits: Limits,
     wire: Wire,
     settings: Settings | None = None,
-    view: InsideView | None = None,
+    view: GroundTruth | None = None,
     progress: Progress | None = None,
 ) -> Record:
     """Run a motion on a table that stands at its start, and return what happened.
@@ -103,10 +126,36 @@ def execute(
         settings.encoder_delay_s,
         settings.run_on_deg,
     )
+    return execute_commands(table, motion, commands, wire, settings, view, progress)
+
+
+def execute_commands(
+    table: TableClient,
+    motion: MotionInTime,
+    commands: Commands,
+    wire: Wire,
+    settings: Settings,
+    view: GroundTruth | None = None,
+    progress: Progress | None = None,
+    record: Record | None = None,
+) -> Record:
+    """Send commands in their time and watch the motion that they make; see `execute`.
+
+    Args:
+        table: the client at the table's port.
+        motion: what the table should do.
+        commands: what to send.
+        wire: what the commands have to pass.
+        settings: how it is run.
+        view: a way to look into the table, where there is one.
+        progress: called with the time of the motion and its end, in ms.
+        record: where to write what happens, if the caller wants to see it meanwhile.
+    """
     # The first command's S and A are to be sent in peace.
     preparation_s = 4.0 * exchanges_s(wire, _ANY_COMMAND)
     origin_s = table.clock.now_s() - motion.start_s + settings.lead_s + preparation_s + _PREPARATION_S
-    record = Record(corrections=commands.corrections, origin_s=origin_s)
+    record = record or Record()
+    record.corrections, record.origin_s = commands.corrections, origin_s
     watch = TableWatch(
         table, motion, wire, record, settings.tolerance_deg, settings.poll_s, settings.look_s, view, progress
     )
@@ -180,7 +229,7 @@ class _Run:
         self,
         table: TableClient,
         wire: Wire,
-        commands: CorrectedStream,
+        commands: Commands,
         watch: TableWatch,
         record: Record,
         lead_s: float,
@@ -189,12 +238,12 @@ class _Run:
         self._watch, self._record, self._lead_s = watch, record, lead_s
         self._latched: MotionCommand | None = None
 
-    def go(self, motion: TableMotion) -> None:
+    def go(self, motion: MotionInTime) -> None:
         """Send all commands in their time, then wait until the table stands."""
         while (timed := self._commands.next()) is not None:
             self._send(timed)
-            following = self._commands.following
-            until_s = motion.end_s if following is None else self._prepare_s(following)
+            begin_s = self._commands.begin_s(self._wire, self._latched)
+            until_s = motion.end_s if begin_s is None else begin_s - self._lead_s - _SLACK_S
             self._watch.read_until(until_s, self._commands.encoder_read)
         self._watch.wait_for_rest(self._latched.target_deg if self._latched else motion.start_deg)
 
@@ -223,8 +272,3 @@ class _Run:
                 f"the command of location {timed.leg.column} would have come {late_s:.2f} s late, more than"
                 f" {allowed_s:g} s: the table or this machine answers too slowly"
             )
-
-    def _prepare_s(self, timed: TimedCommand) -> float:
-        """Return when the lines of a command have to begin."""
-        needed_s = exchanges_s(self._wire, timed.command, self._latched) + self._wire.latency_s + _SLACK_S
-        return timed.time_s - self._lead_s - needed_s

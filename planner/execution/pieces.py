@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from planner.execution.run_on import latest_s, least_rate
 from planner.execution.table_motion import Leg, TableMotion
 from planner.table.motion import Limits
-from planner.table.velocity_profile import MotionCommand
 from planner.table.wire import Wire, exchanges_s
+from protocol.trapezoid import MotionCommand
 
 # What the reference may deviate between two commands because A is greater than that of the plan.
 _DEVIATION_DEG = 0.1
@@ -24,19 +24,26 @@ _LONGEST_S = 1.5
 _ROUNDED_DEG = 0.25
 
 
-def spacing_s(motion: TableMotion, limits: Limits, wire: Wire) -> float:
-    """Return how long the longest commands of a motion take on the line with all that is read between them."""
-    farthest_deg = max(abs(leg.start.angle_deg) for leg in motion.legs) + 1000.0
+def spacing_s(farthest_deg: float, limits: Limits, wire: Wire) -> float:
+    """Return how long the longest commands up to an angle take on the line with all that is read between them."""
+    farthest_deg = abs(farthest_deg) + 1000.0
     return 1.25 * exchanges_s(wire, MotionCommand(-farthest_deg, *limits)) + 0.01
 
 
 def pieces_of(motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float) -> tuple[Leg, ...]:
     """Return the legs of a motion, in parts where one command for the whole leg would not do."""
-    shortest_s = max(_SHORTEST_S, _SHORTEST_EXCHANGES * spacing_s(motion, limits, wire))
-    return tuple(piece for leg in motion.legs for piece in _pieces(leg, limits, shortest_s, run_on_deg))
+    spacing = spacing_s(farthest_deg(motion), limits, wire)
+    return tuple(piece for leg in motion.legs for piece in pieces_of_leg(leg, limits, spacing, run_on_deg))
 
 
-def _pieces(leg: Leg, limits: Limits, shortest_s: float, run_on_deg: float) -> Iterator[Leg]:
+def farthest_deg(motion: TableMotion) -> float:
+    """Return the greatest angle from 0 at which a leg of a motion begins."""
+    return max(abs(leg.start.angle_deg) for leg in motion.legs)
+
+
+def pieces_of_leg(leg: Leg, limits: Limits, spacing: float, run_on_deg: float) -> Iterator[Leg]:
+    """Yield a leg, or its parts, for commands that need a spacing in s between them."""
+    shortest_s = max(_SHORTEST_S, _SHORTEST_EXCHANGES * spacing)
     most = max(1, math.floor(leg.duration_s / shortest_s))
     is_enough = _follows if leg.command is None else _is_short
     count = next((n for n in range(1, most) if is_enough(leg, n, limits, run_on_deg)), most)

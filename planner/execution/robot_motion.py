@@ -53,6 +53,8 @@ def robot_motion(motion: TableMotion, joints_deg: FloatArray) -> RobotMotion:
     for leg in motion.legs:
         if leg.phase is Phase.SCAN or leg.phase is Phase.APPROACH:
             samples.append((leg.end_s, leg.column + 1, Phase.SCAN))
+        elif leg.phase is Phase.WAIT:
+            samples.append((leg.end_s, leg.column, Phase.SCAN))
         elif leg.phase is Phase.RETRACT:
             samples[-1] = (leg.start_s, leg.column, Phase.RETRACT)
         elif leg.phase is Phase.ROTATE:

@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.defaults import RUN_ON_DEG, TOLERANCE_DEG
+from planner.execution.clear_path import check_ends, nearest_turns, turns_to_start
 from planner.execution.execute import Settings, bring_to, execute, resting_deg
-from planner.execution.free_way import check_ends, nearest_turns, turns_to_start
 from planner.execution.robot_motion import robot_motion, turning_time_s
 from planner.execution.run_file import (
-    PLAN_FILE,
     RUN_RESULTS,
     RunConditions,
     StoredRun,
@@ -26,6 +25,7 @@ from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_motion import PauseTimes, TableMotion
 from planner.execution.table_port import CONTROL_TIMEOUT_S, open_port
 from planner.map.map_file import MAP_FILE
+from planner.planning.plan_file import PLAN_FILE
 from planner.set_aside import set_aside
 from planner.table.wire import Wire
 from protocol import TableClient
@@ -88,7 +88,7 @@ def run_plan(
     run_input = load_run_input(plan_file, map_file)
     options = options._replace(pause_times=_with_time_for_the_arm(options.pause_times, run_input))
     limits, wire = run_input.problem.limits, Wire(options.decimals, options.baud)
-    motion = TableMotion(run_input.plan, limits, options.pause_times)
+    motion = run_input.motion(options.pause_times)
     check_ends(run_input.problem.map, motion)
     check_it_fits(stream(motion, limits, wire, options.run_on_deg), wire)
     out.mkdir(parents=True, exist_ok=True)
@@ -98,7 +98,7 @@ def run_plan(
         table_began_s, wall_began_s = table.clock.now_s(), time.perf_counter()
         turns = _turns(run_input, motion, resting_deg(table, wire), options.arm_is_away)
         run_input = run_input.turned(turns)
-        motion = TableMotion(run_input.plan, limits, options.pause_times)
+        motion = run_input.motion(options.pause_times)
         bring_to(table, motion.start_deg, limits, wire)
         settings = Settings(lag_s=options.lag_s, lead_s=options.lead_s, run_on_deg=options.run_on_deg)
         record = execute(table, motion, limits, wire, settings, view, progress)
@@ -128,7 +128,7 @@ def _written(out: Path, plan_file: Path, map_file: Path, stored: StoredRun) -> R
 
 def _with_time_for_the_arm(pause_times: PauseTimes, run_input: RunInput) -> PauseTimes:
     """Return the times of a pause in which every joint can turn at most at its maximum speed."""
-    max_speeds_deg_s = np.array(run_input.document["arm"]["max_speed_deg_s"])
+    max_speeds_deg_s = np.array(run_input.arm.max_speed_deg_s)
     needed_s = turning_time_s(run_input.plan, run_input.joints_deg, max_speeds_deg_s)
     return pause_times._replace(rotate_s=max(pause_times.rotate_s, needed_s))
 

@@ -21,14 +21,15 @@ from planner.execution.run_record import Correction, Observation, Record, Sent
 from planner.execution.run_verification import RunVerification
 from planner.execution.table_motion import PauseTimes, Phase, TableMotion
 from planner.map.map_file import MAP_FILE
-from planner.table.velocity_profile import MotionCommand
+from planner.planning.plan_file import PLAN_FILE
 from planner.table.wire import Wire
 from protocol.data_file import DataFileError, read_json
+from protocol.trapezoid import MotionCommand
 from protocol.whole_file import whole_file, write_whole
 
 _FORMAT = "seventh-axis run"
 _FORMAT_VERSION = 1
-PLAN_FILE, RUN_FILE, SEEN_FILE = "plan.json", "run.json", "run.csv"
+RUN_FILE, SEEN_FILE = "run.json", "run.csv"
 RUN_RESULTS = (RUN_FILE, SEEN_FILE, "run.png", "robot.csv", "robot.json", "report.html")
 """What a run, and the page of it, leave in a folder beside the copies of plan and map."""
 
@@ -164,7 +165,7 @@ def load_run(folder: Path) -> StoredRun:
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, csv.Error) as error:
         raise RunFileError(f"{folder}: its run is damaged: {type(error).__name__}, {error}") from error
     run_input = load_run_input(folder / PLAN_FILE).turned(conditions.turns)
-    motion = TableMotion(run_input.plan, run_input.problem.limits, conditions.pause_times)
+    motion = run_input.motion(conditions.pause_times)
     return StoredRun(run_input, conditions, motion, record)
 
 

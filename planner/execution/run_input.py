@@ -3,23 +3,21 @@
 import json
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from planner.arrays import FloatArray
-from planner.errors import ArmTableError, PlannerError, PoseError
+from planner.errors import PlannerError
+from planner.execution.table_motion import PauseTimes, TableMotion
+from planner.kinematics.arm import Arm
 from planner.kinematics.configuration import Configuration
 from planner.map.map_file import MAP_FILE, load_maps
-from planner.planning.arm_check import PlannedArm, arm_fault
+from planner.planning.arm_check import arm_fault
 from planner.planning.plan import Plan, path_cost
 from planner.planning.plan_check import contradiction
-from planner.planning.plan_file import load_plan
+from planner.planning.plan_file import StoredPlan, load_plan
 from planner.planning.problem import Problem
 from planner.planning.verification import verify
-from planner.table.cost import Weights
-from planner.table.motion import Limits
-from protocol.data_file import read_json
 
 
 class RunInputError(PlannerError):
@@ -35,14 +33,18 @@ class RunInput:
         plan: the table's motion.
         problem: map, limits and weights.
         joints_deg: (n + 1, 6) the arm's joints at each location.
-        document: the plan file as it was read.
+        arm: the arm that follows.
     """
 
     name: str
     plan: Plan
     problem: Problem
     joints_deg: FloatArray
-    document: dict[str, Any]
+    arm: Arm
+
+    def motion(self, pause_times: PauseTimes | None = None) -> TableMotion:
+        """Return the motion of the table, from the run-up to the stop."""
+        return TableMotion(self.plan, self.problem.limits, pause_times or PauseTimes())
 
     def with_cost(self) -> "RunInput":
         """Return the same with the cost that the motion has, whatever the file says."""
@@ -61,36 +63,21 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
     Raises:
         PlannerError: a file cannot be read, is damaged or edited, or plan and map do not belong together.
     """
-    plan = load_plan(plan_file)
+    stored = load_plan(plan_file)
     map_file = map_file or plan_file.with_name(MAP_FILE)
-    try:
-        document = read_json(plan_file)
-        name = str(document["provenance"]["scan"])
-        limits = Limits(*(float(document["limits"][name]) for name in Limits._fields))
-        weights = Weights(float(document["weights"]["k_a"]), float(document["weights"]["k_w"]))
-        digest = document["provenance"]["map"].get("digest")
-        if "arm" not in document:
-            raise RunInputError(
-                f"{plan_file}: does not hold the arm, so its limits cannot be checked: an earlier version wrote it;"
-                f" plan anew with python -m planner plan {name} --out {plan_file.parent}"
-            )
-        planned_arm = PlannedArm.read(document)
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
-        raise RunInputError(f"{plan_file}: is damaged: {type(error).__name__}, {error}") from error
-    except (ArmTableError, PoseError) as error:
-        raise RunInputError(f"{plan_file}: is damaged: {error}") from error
     if not map_file.is_file():
         raise RunInputError(
-            f"{map_file}: the plan's map is not there; python -m planner map {name} --out {map_file.parent} writes it"
+            f"{map_file}: the plan's map is not there; python -m planner map {stored.scan} --out {map_file.parent}"
+            " writes it"
         )
     maps = load_maps(map_file)
-    configuration = Configuration.parse(plan.configuration)
-    if configuration not in maps or maps[configuration].metadata.get("digest") != digest:
+    configuration = Configuration.parse(stored.plan.configuration)
+    if configuration not in maps or maps[configuration].metadata.get("digest") != stored.map_digest:
         raise RunInputError(f"{map_file}: is not the map that {plan_file} was made on; compute map and plan anew")
-    problem = Problem(maps[configuration], plan.step_s, limits, weights)
-    run_input = RunInput(name, plan, problem, planned_arm.joints_deg, document)
+    problem = Problem(maps[configuration], stored.plan.step_s, stored.limits, stored.weights)
+    run_input = RunInput(stored.scan, stored.plan, problem, stored.arm.joints_deg, stored.arm.cell.arm)
     _check(plan_file, run_input)
-    _check_arm(plan_file, run_input, planned_arm)
+    _check_arm(plan_file, run_input, stored)
     return run_input.with_cost()
 
 
@@ -113,13 +100,13 @@ def _check(plan_file: Path, run_input: RunInput) -> None:
         raise RunInputError(f"{plan_file}: meets a forbidden region in step {checked.forbidden_steps[0]}; plan anew")
 
 
-def _check_arm(plan_file: Path, run_input: RunInput, planned_arm: PlannedArm) -> None:
+def _check_arm(plan_file: Path, run_input: RunInput, stored: StoredPlan) -> None:
     """Refuse a plan that the arm cannot follow, by the file or by our own check, or whose arm is not the map's."""
-    if run_input.problem.map.metadata.get("arm") != json.loads(json.dumps(asdict(planned_arm.cell.arm))):
+    if run_input.problem.map.metadata.get("arm") != json.loads(json.dumps(asdict(stored.arm.cell.arm))):
         raise RunInputError(f"{plan_file}: its arm is not the arm that its map was made for; compute map and plan anew")
-    if len(planned_arm.T_WS) != run_input.problem.map.location_count:
-        raise RunInputError(f"{plan_file}: is damaged: it holds {len(planned_arm.T_WS)} poses of the probe")
-    fault = arm_fault(planned_arm, run_input.plan) or run_input.document.get("arm_fault")
+    if len(stored.arm.T_WS) != run_input.problem.map.location_count:
+        raise RunInputError(f"{plan_file}: is damaged: it holds {len(stored.arm.T_WS)} poses of the probe")
+    fault = arm_fault(stored.arm, stored.plan) or stored.arm_fault
     if fault is not None:
         raise RunInputError(
             f"{plan_file}: the arm cannot follow the plan: {fault}; plan anew, with a path that turns the probe less or"

@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 from planner.execution.run_file import StoredRun
 from planner.execution.run_verification import RunVerification
 from planner.execution.table_motion import Phase
-from planner.map.map_colours import coloured
+from planner.map.map_colors import colored
 from planner.map.map_plots import draw_map
 from planner.planning.plan_plots import draw_path, mark_pauses
 from planner.plot_style import (
@@ -81,7 +81,7 @@ def draw_paths(axes: Axes, run: StoredRun, checked: RunVerification) -> None:
         axes.axvspan(step, step + 1, color=VERMILION, alpha=0.4, linewidth=0.0)
     mark_pauses(axes, run.run_input.plan.pauses)
     axes.set_xlabel("scan location")
-    patches = [Patch(facecolor=entry.colour, label=entry.text) for entry in coloured(run.run_input.problem.map)[1]]
+    patches = [Patch(facecolor=entry.color, label=entry.text) for entry in colored(run.run_input.problem.map)[1]]
     axes.legend(
         handles=[*axes.get_legend_handles_labels()[0], *patches],
         loc="upper left",
@@ -128,9 +128,9 @@ def draw_deviation(axes: Axes, run: StoredRun, checked: RunVerification) -> None
         ("encoder", BLUE, planned, [each.encoder_deg for each in seen]),
         ("reference, as commanded", GRAY, ahead, [each.reference_deg for each in seen]),
     )
-    for label, colour, plan, angles in lines:
+    for label, color, plan, angles in lines:
         if seen and None not in angles:
-            axes.plot(times, np.array(angles, dtype=float) - plan, color=colour, linewidth=0.8, label=label)
+            axes.plot(times, np.array(angles, dtype=float) - plan, color=color, linewidth=0.8, label=label)
     for source, marker in (("L", "o"), ("H", ".")):
         read = [each for each in run.record.observations if each.source == source and each.time_s >= 0.0]
         if source == "L":

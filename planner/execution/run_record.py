@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from planner.execution.table_motion import Phase
-from planner.table.velocity_profile import MotionCommand
+from protocol.trapezoid import MotionCommand
 
 
 class Sent(NamedTuple):

@@ -1,7 +1,7 @@
 """From a planned motion to timed commands: one `A`, `S`, `P` for each step, no I/O.
 
 The wire carries one decimal. Rounding each value on its own would let the errors add up, so each step starts from where
-the reference is *predicted* to be, exactly, after all commands before it (`velocity_profile`), and takes the S, the A
+the reference is *predicted* to be, exactly, after all commands before it (`protocol.trapezoid`), and takes the S, the A
 and the moment that bring it nearest to the plan at the step's end (`closest_command`): what one step could not say, the
 next one takes out. Steps that are too long for one command get several (`pieces`).
 """
@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 from planner.defaults import RUN_ON_DEG
 from planner.execution.closest_command import STANDING_DEG_S, Choice, Step, closest_command, going_on, with_target
-from planner.execution.pieces import pieces_of, spacing_s
+from planner.execution.pieces import farthest_deg, pieces_of, spacing_s
 from planner.execution.run_on import latest_s, next_command_within_s
-from planner.execution.table_motion import Leg, TableMotion
+from planner.execution.table_motion import Leg, MotionInTime, TableMotion
 from planner.table.motion import Limits
-from planner.table.velocity_profile import MotionCommand, ReferenceState, advance
 from planner.table.wire import Grid, StreamError, Wire, exchanges_s
+from protocol.trapezoid import MotionCommand, ReferenceState, advance
 
 # From this share of the greatest acceleration on, a plan leaves nothing to make up for an error of the speed.
 _AT_LIMIT = 0.97
@@ -62,21 +62,90 @@ def stream(motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float = 
     return Streaming(motion, limits, wire, run_on_deg).commands()
 
 
+class Encoder:
+    """The command of each piece of a motion, from where the commands before it have brought the reference."""
+
+    def __init__(self, motion: MotionInTime, limits: Limits, wire: Wire, run_on_deg: float, spacing_s: float) -> None:
+        """Encode a motion.
+
+        Args:
+            motion: what the table should do.
+            limits: greatest S and A.
+            wire: how fine the numbers are.
+            run_on_deg: how far the table may run on when the line dies.
+            spacing_s: how long before the end of a piece its command has to take effect at the latest.
+        """
+        self._motion, self._run_on_deg, self._spacing_s = motion, run_on_deg, spacing_s
+        self._grid = Grid(limits, wire)
+        self._most_rate = _AT_LIMIT * limits.acceleration_deg_s2
+
+    @property
+    def start(self) -> ReferenceState:
+        """Where the reference rests before the first command."""
+        return ReferenceState(self._grid.nearest(self._motion.start_deg), 0.0)
+
+    def choice(
+        self,
+        running: TimedCommand | None,
+        before: Callable[[float], ReferenceState],
+        piece: Leg,
+        first_s: float | None = None,
+    ) -> Choice:
+        """Return the command of a piece: its own, or the closest one.
+
+        Args:
+            running: the command before it, as it took effect; None at the start.
+            before: where the reference is at a time without a new command.
+            piece: what the command is for.
+            first_s: its moment, where that is given.
+        """
+        if piece.command is not None:
+            return Choice(piece.start_s if first_s is None else first_s, self._grid.command(piece.command))
+        begin_s = piece.start_s if running is None else max(piece.start_s, running.time_s)
+        # A command that came very late has left little of the step; what is left of its error is taken out later.
+        end_s = max(piece.end_s, begin_s + 0.5 * piece.duration_s)
+        if first_s is None:
+            # The command of the next piece may come at once, and needs its time on the line.
+            latest_s = end_s - min(piece.duration_s, self._spacing_s)
+            if running is not None:
+                latest_s = min(latest_s, self.next_by_s(running))
+            earliest_s, latest_s = begin_s, max(begin_s, latest_s)
+        else:
+            earliest_s = latest_s = first_s
+        middle, end = (self._motion.state_at(time_s) for time_s in (0.5 * (begin_s + end_s), end_s))
+        stands = max(abs(piece.start.speed_deg_s), abs(end.speed_deg_s)) <= STANDING_DEG_S
+        planned = max(abs(leg.acceleration_deg_s2) for leg in (piece, self._motion.leg_at(end_s)))
+        step = Step(begin_s, end_s, earliest_s, latest_s, middle, end, stands, planned > self._most_rate)
+        return closest_command(before, step, self._grid, self._run_on_deg)
+
+    def next_by_s(self, running: TimedCommand) -> float:
+        """Return when the next command has to come at the latest, by plan: a step after this one it always may."""
+        return running.time_s + max(self._within_s(running), running.leg.duration_s)
+
+    def _within_s(self, running: TimedCommand) -> float:
+        """Return how soon after a command the next one has to come, for the run-on of the first to stay short."""
+        _, speed, rate = running.command
+        fastest = max(speed, abs(running.expected.speed_deg_s))
+        return next_command_within_s(fastest, rate, running.leg.duration_s, self._run_on_deg)
+
+    def aimed(self, timed: TimedCommand, next_s: float) -> TimedCommand:
+        """Return a command with a target that serves until the next one."""
+        late_s = latest_s(timed.leg.duration_s)
+        choice = Choice(timed.time_s, timed.command)
+        return timed._replace(command=with_target(choice, timed.expected, next_s, late_s, self._grid))
+
+
 class Streaming:
     """The streaming of one motion, whole or from any of its commands on."""
 
     def __init__(self, motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float) -> None:
         """Part the motion into the pieces that get a command each; see `stream`."""
-        self._motion, self._run_on_deg = motion, run_on_deg
-        self._grid = Grid(limits, wire)
-        self._most_rate = _AT_LIMIT * limits.acceleration_deg_s2
+        self._encoder = Encoder(motion, limits, wire, run_on_deg, spacing_s(farthest_deg(motion), limits, wire))
         self._pieces = pieces_of(motion, limits, wire, run_on_deg)
-        self._spacing_s = spacing_s(motion, limits, wire)
 
     def commands(self) -> tuple[TimedCommand, ...]:
         """Return all commands."""
-        start = ReferenceState(self._grid.nearest(self._motion.start_deg), 0.0)
-        return tuple(self._chain(None, start, self._pieces))
+        return tuple(self._chain(None, self._encoder.start, self._pieces))
 
     def commands_after(self, running: TimedCommand, sent: int, next_s: float) -> Iterator[TimedCommand]:
         """Yield the commands that follow the first `sent` ones, from where those brought the reference.
@@ -94,58 +163,18 @@ class Streaming:
         """Yield a command for each piece, when the moment of the next is known: its target depends on that."""
         pending: TimedCommand | None = None
         for piece in pieces:
-            before = _standing_at(start) if running is None else running.reference_at
-            choice = self._choice(running, before, piece, first_s)
+            before = standing_at(start) if running is None else running.reference_at
+            choice = self._encoder.choice(running, before, piece, first_s)
             if pending is not None:
-                yield self._aimed(pending, choice.time_s)
+                yield self._encoder.aimed(pending, choice.time_s)
             running = pending = TimedCommand(choice.time_s, piece, choice.command, before(choice.time_s))
             first_s = None
         if pending is not None:
             yield pending
 
-    def _choice(
-        self,
-        running: TimedCommand | None,
-        before: Callable[[float], ReferenceState],
-        piece: Leg,
-        first_s: float | None,
-    ) -> Choice:
-        """Return the command of a piece: its own, or the closest one."""
-        if piece.command is not None:
-            return Choice(piece.start_s if first_s is None else first_s, self._grid.command(piece.command))
-        begin_s = piece.start_s if running is None else max(piece.start_s, running.time_s)
-        # A command that came very late has left little of the step; what is left of its error is taken out later.
-        end_s = max(piece.end_s, begin_s + 0.5 * piece.duration_s)
-        if first_s is None:
-            # The command of the next piece may come at once, and needs its time on the line.
-            latest_s = end_s - min(piece.duration_s, self._spacing_s)
-            if running is not None:
-                # A step after the last command it may always come.
-                within_s = max(self._within_s(running), running.leg.duration_s)
-                latest_s = min(latest_s, running.time_s + within_s)
-            earliest_s, latest_s = begin_s, max(begin_s, latest_s)
-        else:
-            earliest_s = latest_s = first_s
-        middle, end = (self._motion.state_at(time_s) for time_s in (0.5 * (begin_s + end_s), end_s))
-        stands = max(abs(piece.start.speed_deg_s), abs(end.speed_deg_s)) <= STANDING_DEG_S
-        planned = max(abs(leg.acceleration_deg_s2) for leg in (piece, self._motion.leg_at(end_s)))
-        step = Step(begin_s, end_s, earliest_s, latest_s, middle, end, stands, planned > self._most_rate)
-        return closest_command(before, step, self._grid, self._run_on_deg)
 
-    def _within_s(self, running: TimedCommand) -> float:
-        """Return how soon after a command the next one has to come, for the run-on of the first to stay short."""
-        _, speed, rate = running.command
-        fastest = max(speed, abs(running.expected.speed_deg_s))
-        return next_command_within_s(fastest, rate, running.leg.duration_s, self._run_on_deg)
-
-    def _aimed(self, timed: TimedCommand, next_s: float) -> TimedCommand:
-        """Return a command with a target that serves until the next one."""
-        late_s = latest_s(timed.leg.duration_s)
-        choice = Choice(timed.time_s, timed.command)
-        return timed._replace(command=with_target(choice, timed.expected, next_s, late_s, self._grid))
-
-
-def _standing_at(state: ReferenceState) -> Callable[[float], ReferenceState]:
+def standing_at(state: ReferenceState) -> Callable[[float], ReferenceState]:
+    """Return where a reference is that rests, at any time."""
     return lambda _: state
 
 

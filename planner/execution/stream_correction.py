@@ -14,19 +14,64 @@ from planner.execution.run_record import Correction
 from planner.execution.stream import Streaming, TimedCommand, check_it_fits
 from planner.execution.table_motion import TableMotion
 from planner.table.motion import Limits
-from planner.table.velocity_profile import ReferenceState
-from planner.table.wire import Wire
+from planner.table.wire import Wire, exchanges_s
+from protocol.trapezoid import MotionCommand, ReferenceState
 
 # A reference farther than this from where the stream had it is worth a new stream.
 _SLIP_DEG = 0.03
 
 
-class CorrectedStream:
+class FollowedReference:
+    """Where the reference is, by the commands that were sent and the readings of the encoder.
+
+    Attributes:
+        running: the last command that was sent: when it took effect, and where the reference then was.
+    """
+
+    def __init__(self, drift_deg: float, drift_filter_s: float, encoder_delay_s: float) -> None:
+        """Follow from rest.
+
+        Args:
+            drift_deg: how far readings may be from where they were expected before the reference is moved.
+            drift_filter_s: over how long readings are averaged for that.
+            encoder_delay_s: how long after the reference's time in the stream the encoder is at the same angle.
+        """
+        self.running: TimedCommand | None = None
+        self._drift_deg, self._encoder_delay_s = drift_deg, encoder_delay_s
+        self._drift = _Drift(drift_filter_s)
+
+    def latest_s(self, timed: TimedCommand) -> float:
+        """Return how late a command may be sent: the one before is good for so much longer than its step."""
+        return latest_s((self.running or timed).leg.duration_s)
+
+    def sent(self, timed: TimedCommand, late_s: float) -> None:
+        """Take note that the next command was sent, and how late."""
+        time_s = timed.time_s + max(0.0, late_s)
+        there = timed.expected if self.running is None else self.running.reference_at(time_s)
+        self.running = timed._replace(time_s=time_s, expected=there)
+
+    def encoder_read(self, time_s: float, angle_deg: float) -> None:
+        """Take note of where the encoder was at a time that is known for certain."""
+        running = self.running
+        if running is not None and (reference_s := time_s - self._encoder_delay_s) >= running.time_s:
+            self._drift.take(time_s, angle_deg - running.reference_at(reference_s).angle_deg)
+
+    def moved_by_drift(self) -> float:
+        """Move the reference to where the readings have it, if that is far from where it was; return by how much."""
+        drift_deg = self._drift.estimate_deg
+        if self.running is None or abs(drift_deg) <= self._drift_deg:
+            return 0.0
+        angle_deg, speed_deg_s = self.running.expected
+        self.running = self.running._replace(expected=ReferenceState(angle_deg + drift_deg, speed_deg_s))
+        self._drift.forget()
+        return drift_deg
+
+
+class CorrectedStream(FollowedReference):
     """The commands of a motion, one after the other. All times are those of the motion.
 
     Attributes:
         corrections: where the commands were computed anew.
-        running: the last command that was sent: when it took effect, and where the reference then was.
     """
 
     def __init__(
@@ -53,10 +98,8 @@ class CorrectedStream:
         Raises:
             StreamError: the commands follow one another faster than the wire carries them.
         """
+        super().__init__(drift_deg, drift_filter_s, encoder_delay_s)
         self.corrections: list[Correction] = []
-        self.running: TimedCommand | None = None
-        self._drift_deg, self._encoder_delay_s = drift_deg, encoder_delay_s
-        self._drift = _Drift(drift_filter_s)
         self._streaming = Streaming(motion, limits, wire, run_on_deg)
         self._commands = list(self._streaming.commands())
         self._rest: Iterator[TimedCommand] = iter(())  # computed as they come due: a new stream takes time
@@ -75,32 +118,22 @@ class CorrectedStream:
         self._correct()
         return self.following
 
-    def latest_s(self, timed: TimedCommand) -> float:
-        """Return how late a command may be sent: the one before is good for so much longer than its step."""
-        return latest_s((self.running or timed).leg.duration_s)
+    def begin_s(self, wire: Wire, latched: MotionCommand | None) -> float | None:
+        """Return when the lines of the next command have to begin, without lead; None when all are sent."""
+        timed = self.following
+        return None if timed is None else timed.time_s - exchanges_s(wire, timed.command, latched) - wire.latency_s
 
     def sent(self, timed: TimedCommand, late_s: float) -> None:
         """Take note that the next command was sent, and how late."""
-        time_s = timed.time_s + max(0.0, late_s)
-        there = timed.expected if self.running is None else self.running.reference_at(time_s)
-        self.running = timed._replace(time_s=time_s, expected=there)
+        super().sent(timed, late_s)
         self._sent += 1
 
-    def encoder_read(self, time_s: float, angle_deg: float) -> None:
-        """Take note of where the encoder was at a time that is known for certain."""
-        running = self.running
-        if running is not None and (reference_s := time_s - self._encoder_delay_s) >= running.time_s:
-            self._drift.take(time_s, angle_deg - running.reference_at(reference_s).angle_deg)
-
     def _correct(self) -> None:
-        running, timed = self.running, self.following
-        if running is None or timed is None:
+        timed = self.following
+        if self.running is None or timed is None:
             return
-        if abs(self._drift.estimate_deg) > self._drift_deg:
-            angle_deg, speed_deg_s = running.expected
-            moved = ReferenceState(angle_deg + self._drift.estimate_deg, speed_deg_s)
-            self.running = running = running._replace(expected=moved)
-            self._drift.forget()
+        self.moved_by_drift()
+        running = self.running
         start = running.reference_at(timed.time_s)
         slip_deg = start.angle_deg - timed.expected.angle_deg
         if abs(slip_deg) > _SLIP_DEG:

@@ -4,18 +4,19 @@ Time 0 is the first scan location. A plan that starts in motion needs a run-up b
 passes the last location, brakes and comes back to it.
 """
 
+import math
 from bisect import bisect_right
 from collections.abc import Iterator
 from enum import StrEnum
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from planner.arrays import FloatArray
 from planner.planning.plan import Pause, Plan
 from planner.table.motion import Limits
-from planner.table.velocity_profile import MotionCommand, ReferenceState, advance, move, time_to_rest_s
+from protocol.trapezoid import MotionCommand, ReferenceState, advance, move, time_to_rest_s
 
 # What the drive needs after its profile has ended, until the table stands.
 _SETTLING_S = 0.3
@@ -26,6 +27,7 @@ class Phase(StrEnum):
 
     RUN_UP = "run-up"
     SCAN = "scan"
+    WAIT = "wait"
     RETRACT = "retract"
     ROTATE = "rotate"
     APPROACH = "approach"
@@ -76,6 +78,31 @@ class PauseTimes(NamedTuple):
     rotate_s: float = 0.0
 
 
+class MotionInTime(Protocol):
+    """A motion as it is streamed, watched and judged: known whole, or as far as it is decided."""
+
+    @property
+    def start_deg(self) -> float:
+        """Where the table has to stand, at rest, before the first leg."""
+
+    @property
+    def start_s(self) -> float:
+        """When the first leg starts."""
+
+    @property
+    def end_s(self) -> float:
+        """When the table stands at the end of what is known."""
+
+    def leg_at(self, time_s: float) -> Leg:
+        """Return the leg at a time."""
+
+    def state_at(self, time_s: float) -> ReferenceState:
+        """Return the planned angle and speed at a time."""
+
+    def column_time_s(self, column: int) -> float:
+        """Return when a scan location is reached; infinite where that is not known."""
+
+
 class TableMotion:
     """The legs of a plan, one after the other.
 
@@ -114,6 +141,10 @@ class TableMotion:
                 times[leg.column + 1] = leg.end_s
         return times
 
+    def column_time_s(self, column: int) -> float:
+        """Return when a scan location is reached; infinite beyond the last."""
+        return float(self.column_times_s[column]) if column < len(self.column_times_s) else math.inf
+
     def leg_at(self, time_s: float) -> Leg:
         """Return the leg at a time; the first one before it all, the last one after."""
         return self.legs[max(0, bisect_right(self._starts, time_s) - 1)]
@@ -133,19 +164,31 @@ def _legs(plan: Plan, limits: Limits, pause_times: PauseTimes) -> Iterator[Leg]:
     if state.speed_deg_s != 0.0:
         yield _run_up(state, rate)
     time_s, paused = 0.0, {pause.step: pause for pause in plan.pauses}
+    waits_s = {wait.location: wait.duration_s for wait in plan.waits}
     for k, acceleration in enumerate(plan.accelerations_deg_s2):
         state = ReferenceState(float(plan.angles_deg[k]), float(plan.speeds_deg_s[k]))
+        if k in waits_s:
+            yield Leg(Phase.WAIT, k, time_s, waits_s[k], state)
+            time_s += waits_s[k]
         if k in paused:
-            for leg in _pause_legs(paused[k], time_s, state, limits, pause_times):
+            for leg in pause_legs(paused[k], time_s, state, limits, pause_times):
                 yield leg
                 time_s = leg.end_s
         else:
             yield Leg(Phase.SCAN, k, time_s, plan.step_s, state, float(acceleration))
             time_s += plan.step_s
     end = ReferenceState(float(plan.angles_deg[-1]), float(plan.speeds_deg_s[-1]))
-    back = MotionCommand(end.angle_deg, limits.speed_deg_s, rate)
-    duration_s = time_to_rest_s(end, back) + _SETTLING_S
-    yield Leg(Phase.STOP, len(plan.accelerations_deg_s2), time_s, duration_s, end, command=back)
+    last = len(plan.accelerations_deg_s2)
+    if last in waits_s:
+        yield Leg(Phase.WAIT, last, time_s, waits_s[last], end)
+        time_s += waits_s[last]
+    yield stop_leg(last, time_s, end, limits)
+
+
+def stop_leg(column: int, time_s: float, end: ReferenceState, limits: Limits) -> Leg:
+    """Return the leg that ends a motion at rest at its last angle."""
+    back = MotionCommand(end.angle_deg, *limits)
+    return Leg(Phase.STOP, column, time_s, time_to_rest_s(end, back) + _SETTLING_S, end, command=back)
 
 
 def _run_up(reached: ReferenceState, rate_deg_s2: float) -> Leg:
@@ -156,7 +199,7 @@ def _run_up(reached: ReferenceState, rate_deg_s2: float) -> Leg:
     return Leg(Phase.RUN_UP, 0, -duration_s, duration_s, ReferenceState(angle, 0.0), acceleration)
 
 
-def _pause_legs(
+def pause_legs(
     pause: Pause, time_s: float, state: ReferenceState, limits: Limits, pause_times: PauseTimes
 ) -> Iterator[Leg]:
     """Yield the legs of a pause: the table comes to rest while the probe retracts, turns, and waits for the probe."""

@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.execution.run_record import Observation, Record
-from planner.execution.table_motion import TableMotion
+from planner.execution.table_motion import MotionInTime
 from planner.table.wire import Wire
 from protocol import TableClient, TableError
-from protocol.bench import InsideView
+from protocol.bench import GroundTruth
 from protocol.progress import Progress
 
 # What the bytes of H, or of L, and of its answer come to.
@@ -34,13 +34,13 @@ class TableWatch:
     def __init__(
         self,
         table: TableClient,
-        motion: TableMotion,
+        motion: MotionInTime,
         wire: Wire,
         record: Record,
         tolerance_deg: float,
         poll_s: float,
         look_s: float,
-        view: InsideView | None = None,
+        view: GroundTruth | None = None,
         progress: Progress | None = None,
     ) -> None:
         """Watch a motion.
@@ -59,7 +59,7 @@ class TableWatch:
         self._table, self._motion, self._wire, self._record = table, motion, wire, record
         self._tolerance_deg, self._poll_s, self._look_s = tolerance_deg, poll_s, look_s
         self._view, self._progress = view, progress
-        self._pending_columns = list(enumerate(motion.column_times_s))
+        self._column = 0  # whose trigger comes next
         self._next_poll_s = self._next_look_s = motion.start_s
 
     def now_s(self) -> float:
@@ -90,7 +90,7 @@ class TableWatch:
         """
         reading_s = self._wire.seconds(_QUESTION_BYTES + _ANSWER_BYTES) + self._wire.turnaround_s
         while True:
-            column_s = float(self._pending_columns[0][1]) if self._pending_columns else float("inf")
+            column_s = self._motion.column_time_s(self._column)
             now_s = self.now_s()
             poll_s = max(now_s, self._next_poll_s)
             # Triggers come first, but L does not tell whether the table strays: fast ones must not crowd out H.
@@ -121,8 +121,8 @@ class TableWatch:
         Unlike H, L is not held against the plan: it tells where the table was at the last trigger that it heard. A
         trigger that was missed costs one profile (`planner.scanning.latching`) and must not stop the table.
         """
-        column, column_s = self._pending_columns.pop(0)
-        time_s = float(column_s)  # a real probe pulled it then
+        column, self._column = self._column, self._column + 1
+        time_s = self._motion.column_time_s(column)  # a real probe pulled it then
         if self._view is not None:
             time_s = self.now_s()
             self._view.trigger()

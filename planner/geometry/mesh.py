@@ -7,7 +7,7 @@ import numpy as np
 import trimesh
 
 from planner.arrays import FloatArray, IndexArray
-from planner.defaults import MILLIMETRES
+from planner.defaults import MILLIMETERS
 from planner.errors import WorkpieceError
 from planner.geometry.closed_surface import closed_surface
 from planner.geometry.crossing import first_crossing
@@ -18,7 +18,7 @@ from protocol.progress import Progress
 SMALLEST_MM = 10.0
 LARGEST_MM = 1000.0
 
-_ASKED = {"m": "metres", "cm": "centimetres", "inch": "inches"}
+_ASKED = {"m": "meters", "cm": "centimeters", "inch": "inches"}
 
 
 def radius_about_axis_mm(mesh: trimesh.Trimesh, T_TW: FloatArray) -> float:
@@ -37,7 +37,7 @@ def load_mesh(
 
     Args:
         file: The file.
-        unit: Of its lengths, one of `MILLIMETRES`; without one they are taken for mm, and a size that tells of another
+        unit: Of its lengths, one of `MILLIMETERS`; without one they are taken for mm, and a size that tells of another
             unit is asked about.
         say: Called with one line when harmless flaws were mended.
         progress: Called with the triangles done and all of them while the surface is checked for crossings.
@@ -47,7 +47,7 @@ def load_mesh(
     """
     content = read_mesh_file(file)
     try:
-        mesh, mended = sound_mesh(content.vertices * MILLIMETRES[unit or "mm"], content.faces, unit, progress)
+        mesh, mended = sound_mesh(content.vertices * MILLIMETERS[unit or "mm"], content.faces, unit, progress)
     except WorkpieceError as error:
         raise WorkpieceError(f"{file}: {error}") from error
     notes = (*content.notes, *mended)
@@ -92,5 +92,5 @@ def size_fault(extents_mm: FloatArray, *, ask: bool = True) -> str | None:
     if SMALLEST_MM <= largest_mm <= LARGEST_MM:
         return None
     fault = f"the workpiece's longest side is {largest_mm:g} mm; allowed is {SMALLEST_MM:g} to {LARGEST_MM:g} mm"
-    others = [name for unit, name in _ASKED.items() if SMALLEST_MM <= largest_mm * MILLIMETRES[unit] <= LARGEST_MM]
+    others = [name for unit, name in _ASKED.items() if SMALLEST_MM <= largest_mm * MILLIMETERS[unit] <= LARGEST_MM]
     return f"{fault}; is it in {' or '.join(others)}?" if ask and others else fault

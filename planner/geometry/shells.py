@@ -68,9 +68,9 @@ def _shells(edges: Edges, patches: IndexArray) -> IndexArray:
     is_open[met[counts % 2 == 1, 1]] = True
     # Around one edge, the open patches belong together.
     met = met[is_open[met[:, 1]]]
-    neighbours = np.column_stack((met[:-1], met[1:]))
-    neighbours = neighbours[neighbours[:, 0] == neighbours[:, 2]][:, [1, 3]]
-    return connected(neighbours, len(is_open))[patches]
+    neighbors = np.column_stack((met[:-1], met[1:]))
+    neighbors = neighbors[neighbors[:, 0] == neighbors[:, 2]][:, [1, 3]]
+    return connected(neighbors, len(is_open))[patches]
 
 
 def _check_that_sides_agree(vertices: FloatArray, edges: Edges, shells: IndexArray, turned: BoolArray) -> None:

@@ -5,8 +5,8 @@ field is built once and kept on disk under the mesh's content and the resolution
 """
 
 import hashlib
+import io
 import zipfile
-from contextlib import suppress
 from math import hypot, sqrt
 from pathlib import Path
 from typing import NamedTuple
@@ -20,9 +20,8 @@ from planner.geometry.bounding_volume_hierarchy import bounding_volume_hierarchy
 from planner.geometry.shells import turned_outward
 from planner.geometry.winding_number import BESIDE, winding_numbers
 from planner.kernel import kernel
-from protocol.kept_code import cache_root
+from protocol.kept_file import FIELD, cache_root, keep_file, load_file
 from protocol.progress import Progress
-from protocol.whole_file import whole_file
 
 _MOST_POINTS = 4_000_000
 _RULES = b"nested grids, any winding, signs by the nesting of shells"
@@ -150,16 +149,14 @@ def cached_field(
     folder: Path | None = None,
 ) -> SignedDistanceField:
     """Return the field of `mesh`, read from `folder` if it was built before (default: the user's cache)."""
-    file = (folder or _cache_folder()) / f"{_digest(mesh, spacing_mm)}.npz"
+    file = (folder or _cache_folder()) / f"{_digest(mesh, spacing_mm)}{FIELD}"
     stored = _load(file)
     if stored is not None:
         return stored
     field = build_field(mesh, spacing_mm, progress)
-    # A folder that cannot be written costs the next run its time and this one nothing.
-    with suppress(OSError):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(file) as partial:
-            np.savez(partial, **field._asdict())
+    content = io.BytesIO()
+    np.savez(content, **field._asdict())
+    keep_file(file, content.getvalue())
     return field
 
 
@@ -175,9 +172,12 @@ def _digest(mesh: trimesh.Trimesh, spacing_mm: float) -> str:
 
 
 def _load(file: Path) -> SignedDistanceField | None:
-    """Return the stored field, or None where there is none or a damaged one: it is then built anew."""
+    """Return the stored field, or None where there is none that can be trusted: it is then built anew."""
+    content = load_file(file)
+    if content is None:
+        return None
     try:
-        with file.open("rb") as content, np.load(content) as stored:
+        with np.load(io.BytesIO(content)) as stored:
             return SignedDistanceField(stored["values_mm"], stored["levels"])
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None

@@ -39,19 +39,6 @@ def from_xyz_yaw_pitch_roll(locations: FloatArray) -> FloatArray:
     return T
 
 
-def to_xyz_yaw_pitch_roll(T: FloatArray) -> FloatArray:
-    """Return rows x y z (mm) yaw pitch roll (deg) `(n, 6)` for `(n, 4, 4)`.
-
-    Pitch is in 0..180. At pitch 0 and 180 yaw and roll turn about the same axis, and yaw is 0.
-    """
-    sine = np.hypot(T[:, 0, 2], T[:, 1, 2])
-    yaw = np.where(sine > 1e-12, np.arctan2(T[:, 1, 2], T[:, 0, 2]), 0.0)
-    pitch = np.arctan2(sine, T[:, 2, 2])
-    c, s = np.cos(yaw), np.sin(yaw)
-    roll = np.arctan2(c * T[:, 1, 0] - s * T[:, 0, 0], c * T[:, 1, 1] - s * T[:, 0, 1])
-    return np.column_stack((T[:, :3, 3], np.degrees(np.column_stack((yaw, pitch, roll)))))
-
-
 def rigid_inverse(T: FloatArray) -> FloatArray:
     """Return the inverses of rigid transformations `(..., 4, 4)`."""
     inverse = np.zeros_like(T)

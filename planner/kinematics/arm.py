@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from planner.arrays import FloatArray
-from planner.errors import ArmTableError
+from planner.errors import ArmTableError, ScanFileError
 from planner.kernel import kernel
-from planner.toml_table import TomlTable
+from protocol.toml_table import TomlTable
 
 _SHIPPED = Path(__file__).parents[1] / "arms"
 _ORTHO_PARALLEL_ALPHA_DEG = (-90.0, 0.0, 90.0, -90.0, 90.0, 0.0)
@@ -102,7 +102,7 @@ class Arm:
             ArmTableError: See the class.
         """
         shipped = _SHIPPED / f"{file}.toml"
-        top = TomlTable.load(shipped if shipped.is_file() else Path(file))
+        top = TomlTable.load(shipped if shipped.is_file() else Path(file), ScanFileError)
         name = top.text("name")
         rows = top.tables("joint", 6)
         limits = [row.numbers("limits_deg", 2) for row in rows]

@@ -44,7 +44,7 @@ _REACHED = int(Reason.REACHED)
 _SINGULAR = int(Reason.SINGULAR)
 _JOINT_1_LIMIT = int(Reason.JOINT_1_LIMIT)
 
-_NO_POSES = np.empty((0, 0, 0, 6)), np.empty((0, 0, 0))
+NO_POSES = np.empty((0, 0, 0, 6)), np.empty((0, 0, 0))
 _MOST_CELLS = 50_000_000
 """Half a gigabyte."""
 _BLOCK_CELLS = 16_384
@@ -83,7 +83,7 @@ def build_maps(
             " or one configuration"
         )
     values, reasons = np.empty(shape), np.empty(shape, dtype=np.uint8)
-    cells = _cells(problem, configurations, n_angles)
+    cells = lay_out_cells(problem, configurations, n_angles)
     block = max(1, _BLOCK_CELLS // n_angles)
     if progress is not None:
         progress(0, n_locations)
@@ -91,14 +91,14 @@ def build_maps(
         last = min(first + block, n_locations)
         window = values[:, first:last], reasons[:, first:last]
         if user_factors:
-            _rate_with_user_factors(cells, problem.cell.arm, user_factors, first, *window)
+            rate_with_user_factors(cells, problem.cell.arm, user_factors, first, *window)
         else:
-            _rate_columns(*cells, first, *window, *_NO_POSES)
+            rate_columns(*cells, first, *window, *NO_POSES)
         if progress is not None:
             progress(last, n_locations)
     metadata = {
         "scan": problem.name,
-        "digest": _digest(cells, user_names),
+        "digest": digest_of(cells, user_names),
         "arm": asdict(problem.cell.arm),
         "reasons": texts,
     }
@@ -112,10 +112,10 @@ def build_maps(
 
 def is_compiled() -> bool:
     """Return whether the machine code of a map is kept from an earlier run."""
-    return is_kept(_rate_columns)
+    return is_kept(rate_columns)
 
 
-class _Cells(NamedTuple):
+class Cells(NamedTuple):
     """A map problem in the arrays that the kernel takes, in its order."""
 
     arm: FloatArray
@@ -134,10 +134,11 @@ class _Cells(NamedTuple):
     obstacle_frames: FloatArray  # (n_angles, n_obstacles, 3, 4)
 
 
-def _cells(problem: MapProblem, configurations: Sequence[Configuration], n_angles: int) -> _Cells:
+def lay_out_cells(problem: MapProblem, configurations: Sequence[Configuration], n_angles: int) -> Cells:
+    """Return a map problem as the kernel takes it."""
     angles_deg = np.linspace(0.0, 360.0, n_angles, endpoint=False)
     model = problem.collision
-    return _Cells(
+    return Cells(
         problem.cell.arm.table,
         np.ascontiguousarray(problem.cell.table_factors(angles_deg)[:, :3]),
         np.ascontiguousarray(problem.cell.location_factors(problem.T_WS)),
@@ -154,7 +155,7 @@ def _cells(problem: MapProblem, configurations: Sequence[Configuration], n_angle
     )
 
 
-def _digest(cells: _Cells, user_factor_names: Sequence[str]) -> str:
+def digest_of(cells: Cells, user_factor_names: Sequence[str]) -> str:
     """Return a digest of all that a map depends on, except which configurations were asked for and users' code."""
     content = hashlib.sha256("\0".join(user_factor_names).encode())
     for array in cells._replace(slots=np.empty(0, dtype=np.int64)):
@@ -162,16 +163,34 @@ def _digest(cells: _Cells, user_factor_names: Sequence[str]) -> str:
     return content.hexdigest()[:16]
 
 
-def _rate_with_user_factors(
-    cells: _Cells, arm: Arm, factors: Sequence[UserFactor], first: int, values: FloatArray, reasons: CodeArray
+def rate_with_user_factors(
+    cells: Cells,
+    arm: Arm,
+    factors: Sequence[UserFactor],
+    first: int,
+    values: FloatArray,
+    reasons: CodeArray,
+    location: int | None = None,
 ) -> None:
+    """Write f_R and reasons of the columns from `first` on as `rate_columns` does, times the users' factors.
+
+    Args:
+        cells: the map problem.
+        arm: its arm.
+        factors: the users' factors.
+        first: the first column, as a row of the cells' goals.
+        values: `(n_configurations, n_columns, n_angles)`, written.
+        reasons: the same.
+        location: the number of the first column's location, where it is not its row.
+    """
+    location = first if location is None else location
     joints, clearance_mm = np.empty((*values.shape, 6)), np.empty(values.shape)
-    _rate_columns(*cells, first, values, reasons, joints, clearance_mm)
+    rate_columns(*cells, first, values, reasons, joints, clearance_mm)
     alive = np.nonzero(values)
     rated = RatedPoses(
         np.radians(arm.robot_deg(joints[alive])),
         clearance_mm[alive],
-        alive[1] + first,
+        alive[1] + location,
         alive[2] * (360.0 / values.shape[2]),
     )
     value, reason = values[alive], np.zeros(len(alive[0]), dtype=np.uint8)
@@ -193,7 +212,7 @@ def _rates(factor: UserFactor, poses: RatedPoses) -> FloatArray:
 
 
 @kernel
-def _rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between would pass twenty of them on
+def rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between would pass twenty of them on
     arm: FloatArray, table_poses: FloatArray, T_TF: FloatArray, value: FloatArray, ranges: FloatArray,
     slots: IndexArray, beam_mm: float, n_common: int, pairs: IndexArray, bodies: FloatArray,
     obstacles: FloatArray, field_values: npt.NDArray[np.float32], field_levels: FloatArray,

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from planner.arrays import FloatArray
 from planner.map.config_map import ConfigurationMap
-from planner.map.map_colours import DARKEST_GRAY, LegendEntry, coloured
+from planner.map.map_colors import DARKEST_GRAY, LegendEntry, colored
 from planner.plot_style import INK, VERMILION, new_figure, save_picture, styled
 
 _LEGEND_COLUMNS = 3
@@ -29,7 +29,7 @@ def plot_map(configuration_map: ConfigurationMap, file: Path) -> None:
 @styled()
 def map_figure(configuration_map: ConfigurationMap) -> Figure:
     """Return the map as a flat picture: location to the right, table angle upwards; Fig. 6a of the paper."""
-    legend = coloured(configuration_map)[1]
+    legend = colored(configuration_map)[1]
     figure = new_figure(5.0 + legend_height_in(legend))
     axes = figure.add_subplot()
     draw_map(axes, configuration_map)
@@ -42,7 +42,7 @@ def map_figure(configuration_map: ConfigurationMap) -> Figure:
 
 def draw_map(axes: Axes, configuration_map: ConfigurationMap) -> None:
     """Draw the map in its colors, with a mark above each location that no table angle serves."""
-    image, _ = coloured(configuration_map)
+    image, _ = colored(configuration_map)
     half_step = configuration_map.angle_step_deg / 2
     extent = (-0.5, configuration_map.location_count - 0.5, -half_step, 360.0 - half_step)
     axes.imshow(image, origin="lower", aspect="auto", extent=extent)
@@ -67,10 +67,10 @@ def draw_map(axes: Axes, configuration_map: ConfigurationMap) -> None:
 @styled()
 def plot_map_cylinder(configuration_map: ConfigurationMap, file: Path) -> None:
     """Write the map rolled up and seen from two sides, since the table turns without end; Fig. 6b of the paper."""
-    image, legend = coloured(configuration_map)
+    image, legend = colored(configuration_map)
     figure = new_figure(6.6 + legend_height_in(legend), 8.0)
-    for axes, centre_deg in zip(figure.subplots(2, 1), (180.0, 0.0), strict=True):
-        _draw_tube(axes, image, centre_deg)
+    for axes, center_deg in zip(figure.subplots(2, 1), (180.0, 0.0), strict=True):
+        _draw_tube(axes, image, center_deg)
     _title(figure, configuration_map)
     draw_grays(figure, figure.axes[:2])
     draw_legend(figure, legend)
@@ -83,9 +83,9 @@ _BULGE = 0.3
 """How far the near half of a rim is drawn to the left of its ends, and the far half to the right, in radii."""
 
 
-def _draw_tube(axes: Axes, image: FloatArray, centre_deg: float) -> None:
+def _draw_tube(axes: Axes, image: FloatArray, center_deg: float) -> None:
     axes.imshow(
-        _tube(image, centre_deg, 700, 260),
+        _tube(image, center_deg, 700, 260),
         extent=(-_BULGE, _LENGTH + _BULGE, -1.0, 1.0),
         origin="lower",
         aspect="equal",
@@ -100,7 +100,7 @@ def _draw_tube(axes: Axes, image: FloatArray, centre_deg: float) -> None:
         y, z = np.sin(np.radians(offset_deg)), np.cos(np.radians(offset_deg))
         rim = -_BULGE * z
         axes.plot([rim - 0.06, rim], [y, y], color=INK, linewidth=0.8, clip_on=False)
-        angle = f"{(centre_deg + offset_deg) % 360.0:.0f}"
+        angle = f"{(center_deg + offset_deg) % 360.0:.0f}"
         axes.text(rim - 0.1, y, angle, ha="right", va="center", fontsize=9, color=INK)
     axes.text(_LENGTH / 2, -1.32, "scan location", ha="center", va="top", fontsize=10, color=INK)
     axes.text(-0.85, 0.0, "table angle (deg)", ha="center", va="center", rotation=90, fontsize=10, color=INK)
@@ -109,8 +109,8 @@ def _draw_tube(axes: Axes, image: FloatArray, centre_deg: float) -> None:
     axes.set_axis_off()
 
 
-def _tube(image: FloatArray, centre_deg: float, width: int, height: int) -> FloatArray:
-    """Return an RGBA picture of an open tube with the image on its wall, `centre_deg` of it in front.
+def _tube(image: FloatArray, center_deg: float, width: int, height: int) -> FloatArray:
+    """Return an RGBA picture of an open tube with the image on its wall, `center_deg` of it in front.
 
     A wall point at location s and angle phi from the front is drawn at (s - bulge cos(phi), sin(phi)), so each
     pixel shows the near half where that is there, else the inside of the far half.
@@ -123,16 +123,16 @@ def _tube(image: FloatArray, centre_deg: float, width: int, height: int) -> Floa
     for side, shade in ((-1.0, 0.30 + 0.15 * depth), (1.0, 0.55 + 0.45 * depth)):
         s = (along + _BULGE * side * depth) / _LENGTH
         seen = (s >= 0.0) & (s < 1.0)
-        angle_deg = centre_deg + np.degrees(np.arctan2(across, side * depth))
+        angle_deg = center_deg + np.degrees(np.arctan2(across, side * depth))
         row = np.rint(angle_deg / 360.0 * image.shape[0]).astype(int) % image.shape[0]
         column = np.floor(s * image.shape[1]).astype(int)
         picture[seen, :3] = image[row[seen], column[seen]] * shade[seen, None]
         picture[seen, 3] = 1.0
-    # Colours weighted by their cover, or the rim would get a dark seam.
+    # Colors weighted by their cover, or the rim would get a dark seam.
     samples = picture.reshape(height, _SAMPLES, width, _SAMPLES, 4)
     cover = samples[..., 3].mean(axis=(1, 3))
-    colour = (samples[..., :3] * samples[..., 3:]).mean(axis=(1, 3)) / np.maximum(cover, 1e-9)[..., None]
-    return np.dstack([np.clip(colour, 0.0, 1.0), cover])
+    color = (samples[..., :3] * samples[..., 3:]).mean(axis=(1, 3)) / np.maximum(cover, 1e-9)[..., None]
+    return np.dstack([np.clip(color, 0.0, 1.0), cover])
 
 
 def _title(figure: Figure, configuration_map: ConfigurationMap) -> None:
@@ -158,7 +158,7 @@ def draw_legend(figure: Figure, legend: list[LegendEntry]) -> None:
     """Draw below the figure what the colors of the forbidden cells mean."""
     if legend:
         figure.legend(
-            [Patch(facecolor=entry.colour) for entry in legend],
+            [Patch(facecolor=entry.color) for entry in legend],
             [f"{entry.text} ({_percent(entry.share)})" for entry in legend],
             loc="outside lower center",
             ncols=min(_LEGEND_COLUMNS, len(legend)),

@@ -1,13 +1,11 @@
 """Check the arm's side of a plan: does the arm hold the probe where the scan wants it, and within its limits?"""
 
-from dataclasses import fields
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planner.arrays import FloatArray
 from planner.cell.cell import Cell
-from planner.kinematics.arm import Arm
 from planner.kinematics.configuration import Configuration
 from planner.kinematics.joint_configurations import configurations
 from planner.kinematics.joint_limits import first_joint_fault
@@ -30,23 +28,6 @@ class PlannedArm(NamedTuple):
     cell: Cell
     T_WS: FloatArray
     joints_deg: FloatArray
-
-    @classmethod
-    def read(cls, document: dict[str, Any]) -> "PlannedArm":
-        """Return what a plan's document says of the arm; numbers that are missing become NaN.
-
-        Raises:
-            PlannerError: the arm's table or a placement is not one.
-            KeyError, TypeError, ValueError: an entry is missing, or of another type.
-        """
-        stored = document["arm"]
-        columns = (tuple(map(float, stored[column.name])) for column in fields(Arm)[1:])
-        T_BT, T_TW, T_FS = (
-            np.array(document["cell"][name], dtype=np.float64).reshape(4, 4) for name in ("T_BT", "T_TW", "T_FS")
-        )
-        T_WS = np.array(document["locations"], dtype=np.float64).reshape(-1, 4, 4)
-        joints_deg = np.array(document["joints_deg"], dtype=np.float64)
-        return cls(Cell(Arm(str(stored["name"]), *columns), T_BT, T_TW, T_FS), T_WS, joints_deg)
 
 
 def arm_fault(planned: PlannedArm, plan: Plan) -> str | None:

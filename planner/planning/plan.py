@@ -27,6 +27,13 @@ class Pause(NamedTuple):
     to_angle_deg: float
 
 
+class Wait(NamedTuple):
+    """The table stands at a location, and the arm with it, before the scan goes on."""
+
+    location: int
+    duration_s: float
+
+
 class Infeasibility(Enum):
     """Why there is no plan."""
 
@@ -77,6 +84,7 @@ class Plan:
         accelerations_deg_s2: (n,) acceleration of each step, 0 in a pause.
         cost: Eq. (7) by term.
         pauses: where the scan stops.
+        waits: where the scan waits at rest, in the order of the locations.
         computing_time_s: how long planning took, where the caller measured it.
     """
 
@@ -88,6 +96,7 @@ class Plan:
     accelerations_deg_s2: FloatArray
     cost: PathCost
     pauses: tuple[Pause, ...] = ()
+    waits: tuple[Wait, ...] = ()
     computing_time_s: float | None = field(default=None, compare=False)
 
     def turned(self, turns: int) -> "Plan":

@@ -21,6 +21,9 @@ def contradiction(plan: Plan) -> str | None:
             plan.angles_deg[step], plan.angles_deg[step + 1], plan.speeds_deg_s[step + 1]
         ):  # fmt: skip
             return f"the pause in step {step} contradicts the angles"
+    for location, duration_s in plan.waits:
+        if not 0 <= location < len(plan.angles_deg) or not 0.0 < duration_s < np.inf or plan.speeds_deg_s[location]:
+            return f"the wait at location {location} contradicts the motion, which does not rest there"
     for k, acceleration in enumerate(plan.accelerations_deg_s2):
         angle, speed = float(plan.angles_deg[k]), float(plan.speeds_deg_s[k])
         angle_error = plan.angles_deg[k + 1] - next_angle(angle, speed, float(acceleration), plan.step_s)

@@ -1,31 +1,58 @@
 """A plan on disk: one JSON file with everything needed to run it. The same plan gives the same bytes."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planner.arrays import FloatArray
+from planner.cell.cell import Cell
 from planner.cell.scan import Scan
-from planner.errors import PlannerError
+from planner.errors import ArmTableError, PlannerError, PoseError
+from planner.kinematics.arm import Arm
+from planner.planning.arm_check import PlannedArm
 from planner.planning.arm_motion import ArmMotion
-from planner.planning.plan import Pause, Plan
+from planner.planning.plan import Pause, Plan, Wait
 from planner.planning.problem import Problem
 from planner.planning.verification import verify
-from planner.table.cost import PathCost
+from planner.table.cost import PathCost, Weights
+from planner.table.motion import Limits
 from protocol.data_file import DataFileError, read_json
 from protocol.software_version import software_version
 from protocol.whole_file import write_whole
 
+PLAN_FILE = "plan.json"
 _FORMAT = "seventh-axis plan"
 _FORMAT_VERSION = 1
 _DECIMALS = 9
 
 
 class PlanFileError(PlannerError):
-    """A file that cannot be read or holds no plan."""
+    """A file that cannot be read, holds no plan, or is damaged."""
+
+
+class StoredPlan(NamedTuple):
+    """A plan as a file holds it.
+
+    Attributes:
+        scan: what the scan is called.
+        plan: the table's motion.
+        limits: the limits of the table that it was made for.
+        weights: the weights of its cost.
+        arm: the arm's side of it.
+        arm_fault: why the arm cannot follow, as the planner found it.
+        map_digest: which map it was made on.
+    """
+
+    scan: str
+    plan: Plan
+    limits: Limits
+    weights: Weights
+    arm: PlannedArm
+    arm_fault: object
+    map_digest: object
 
 
 def plan_document(scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -> dict[str, Any]:
@@ -48,6 +75,7 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -
             "speeds_deg_s": plan.speeds_deg_s.tolist(),
             "accelerations_deg_s2": plan.accelerations_deg_s2.tolist(),
             "pauses": [pause._asdict() for pause in plan.pauses],
+            **({"waits": [wait._asdict() for wait in plan.waits]} if plan.waits else {}),
         },
         "joints_deg": _rounded(motion.robot_deg),
         "start_turns": motion.start_turns.tolist(),
@@ -80,39 +108,75 @@ def save_plan(file: Path, document: dict[str, Any]) -> None:
     write_whole(file, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
 
-def load_plan(file: Path) -> Plan:
-    """Return the table's motion that a file holds.
+def load_plan(file: Path) -> StoredPlan:
+    """Return what a file holds.
 
     Raises:
-        PlanFileError: the file cannot be read, or is no plan of this format.
+        PlanFileError: the file cannot be read, or is no plan of this format, or is damaged.
     """
     try:
         document = read_json(file)
-        if (document["format"], document["format_version"]) != (_FORMAT, _FORMAT_VERSION):
-            raise PlanFileError(f"{file}: is not a plan of format version {_FORMAT_VERSION}")
-        table, cost = document["table"], dict(document["cost"])
-        cost.pop("total")
-        plan = Plan(
+    except DataFileError as error:
+        raise PlanFileError(str(error)) from error
+    if not isinstance(document, dict) or document.get("format") != _FORMAT:
+        raise PlanFileError(f"{file}: holds no plan that this program has written")
+    if document.get("format_version") != _FORMAT_VERSION:
+        raise PlanFileError(f"{file}: is not a plan of format version {_FORMAT_VERSION}")
+    try:
+        stored = _stored(file, document)
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
+        raise PlanFileError(f"{file}: is damaged: {type(error).__name__}, {error}") from error
+    except (ArmTableError, PoseError) as error:
+        raise PlanFileError(f"{file}: is damaged: {error}") from error
+    plan = stored.plan
+    if not len(plan.angles_deg) == len(plan.speeds_deg_s) == len(plan.accelerations_deg_s2) + 1:
+        raise PlanFileError(f"{file}: is damaged: angles, speeds and accelerations do not belong together")
+    return stored
+
+
+def _stored(file: Path, document: dict[str, Any]) -> StoredPlan:
+    scan = str(document["provenance"]["scan"])
+    if "arm" not in document:
+        raise PlanFileError(
+            f"{file}: does not hold the arm, so its limits cannot be checked: an earlier version wrote it;"
+            f" plan anew with python -m planner plan {scan} --out {file.parent}"
+        )
+    table, cost = document["table"], document["cost"]
+    return StoredPlan(
+        scan=scan,
+        plan=Plan(
             planner=str(document["planner"]),
             configuration=str(document["configuration"]),
             step_s=float(document["step_s"]),
             angles_deg=np.array(table["angles_deg"], dtype=np.float64),
             speeds_deg_s=np.array(table["speeds_deg_s"], dtype=np.float64),
             accelerations_deg_s2=np.array(table["accelerations_deg_s2"], dtype=np.float64),
-            cost=PathCost(**cost),
+            cost=PathCost(**{name: cost[name] for name in PathCost._fields}),
             pauses=tuple(Pause(**pause) for pause in table["pauses"]),
-        )
-    except DataFileError as error:
-        raise PlanFileError(str(error)) from error
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
-        raise PlanFileError(f"{file}: holds no plan that this program has written") from error
-    if not len(plan.angles_deg) == len(plan.speeds_deg_s) == len(plan.accelerations_deg_s2) + 1:
-        raise PlanFileError(f"{file}: is damaged: angles, speeds and accelerations do not belong together")
-    return plan
+            waits=tuple(Wait(**wait) for wait in table.get("waits", ())),
+        ),
+        limits=Limits(*(float(document["limits"][name]) for name in Limits._fields)),
+        weights=Weights(float(document["weights"]["k_a"]), float(document["weights"]["k_w"])),
+        arm=_planned_arm(document),
+        arm_fault=document.get("arm_fault"),
+        map_digest=document["provenance"]["map"].get("digest"),
+    )
+
+
+def _planned_arm(document: dict[str, Any]) -> PlannedArm:
+    """Return what a plan's document holds of the arm; numbers that are missing become NaN."""
+    stored = document["arm"]
+    columns = (tuple(map(float, stored[column.name])) for column in fields(Arm)[1:])
+    T_BT, T_TW, T_FS = (
+        np.array(document["cell"][name], dtype=np.float64).reshape(4, 4) for name in ("T_BT", "T_TW", "T_FS")
+    )
+    T_WS = np.array(document["locations"], dtype=np.float64).reshape(-1, 4, 4)
+    joints_deg = np.array(document["joints_deg"], dtype=np.float64)
+    return PlannedArm(Cell(Arm(str(stored["name"]), *columns), T_BT, T_TW, T_FS), T_WS, joints_deg)
 
 
 def _rounded(array: FloatArray) -> list[Any]:
-    """Return nested lists without noise below a nanometre, and None where there is no number."""
+    """Return nested lists without noise below a nanometer, and None where there is no number."""
     rounded = (np.round(array, _DECIMALS) + 0.0).astype(object)
     rounded[np.isnan(array)] = None
     return list(rounded.tolist())

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import Normal, Stroke
 
 from planner.arrays import FloatArray
-from planner.map.map_colours import coloured
+from planner.map.map_colors import colored
 from planner.map.map_plots import draw_grays, draw_legend, draw_map, legend_height_in
 from planner.planning.plan import Pause, Plan
 from planner.planning.problem import Problem
@@ -26,7 +26,7 @@ PATH: dict[str, Any] = {
 @styled()
 def plan_figure(problem: Problem, plan: Plan, title: str) -> Figure:
     """Return a plan on its map, with its speed, its acceleration, the limits and the pauses."""
-    legend = coloured(problem.map)[1]
+    legend = colored(problem.map)[1]
     figure = new_figure(8.6 + legend_height_in(legend))
     on_map, speed, acceleration = figure.subplots(3, 1, sharex=True, height_ratios=(2.2, 1.0, 1.0))
     draw_map(on_map, problem.map)

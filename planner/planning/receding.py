@@ -133,7 +133,7 @@ def online_step(
         angle_deg: the present angle.
         speed_deg_s: the present speed.
     """
-    _look_ahead(online, node_cost, sweep, column, last)
+    look_ahead(online, node_cost, sweep, column, last)
     acceleration = _best_acceleration(terms, online, node_cost, column, last, angle_deg, speed_deg_s)
     if np.isnan(acceleration):
         return _best_angle_after_pause(online, node_cost, column, angle_deg), 0.0, np.nan
@@ -145,7 +145,7 @@ def online_step(
 
 
 @kernel
-def _look_ahead(online: OnlineStep, node_cost: CostArray, sweep: RunArray, column: int, last: int) -> None:
+def look_ahead(online: OnlineStep, node_cost: CostArray, sweep: RunArray, column: int, last: int) -> None:
     """Leave the cost-to-go of column + 1, over the columns up to `last`, in the layer of that column."""
     layers, pause_price = online.layers, float(last - column)
     layers[last % 2] = 0.0
@@ -159,11 +159,11 @@ def _best_acceleration(
     terms: Terms, online: OnlineStep, node_cost: CostArray, column: int, last: int, angle_deg: float, speed_deg_s: float
 ) -> float:
     """Return the first acceleration of the best motion from a state; NaN where it is better, or necessary, to pause."""
-    after_pause = _costs_at_rest(online, node_cost, column).min()
+    after_pause = costs_at_rest(online, node_cost, column).min()
     best, least = np.nan, after_pause + (last - column) * online.unit
     for trial in range(TRIALS):
         acceleration = (2.0 * trial / (TRIALS - 1) - 1.0) * terms.acceleration_limit_deg_s2
-        cost = _trial_cost(terms, online, column, angle_deg, speed_deg_s, acceleration)
+        cost = trial_cost(terms, online, column, angle_deg, speed_deg_s, acceleration)
         if cost < least:
             best, least = acceleration, cost
     return best
@@ -172,12 +172,12 @@ def _best_acceleration(
 @kernel
 def _best_angle_after_pause(online: OnlineStep, node_cost: CostArray, column: int, angle_deg: float) -> float:
     """Return the angle of the next column, reached by the shorter way round, from which the way on costs least."""
-    target_deg = _costs_at_rest(online, node_cost, column).argmin() * 360.0 / online.grid.angle_count
+    target_deg = costs_at_rest(online, node_cost, column).argmin() * 360.0 / online.grid.angle_count
     return float(target_deg - 360.0 * np.round((target_deg - angle_deg) / 360.0))
 
 
 @kernel
-def _costs_at_rest(online: OnlineStep, node_cost: CostArray, column: int) -> FloatArray:
+def costs_at_rest(online: OnlineStep, node_cost: CostArray, column: int) -> FloatArray:
     """Return, per angle, what it costs to be at rest there in the next column and to go on."""
     costs: FloatArray = (node_cost[column + 1] + online.layers[(column + 1) % 2, online.grid.half_count]).astype(
         np.float64
@@ -186,7 +186,7 @@ def _costs_at_rest(online: OnlineStep, node_cost: CostArray, column: int) -> Flo
 
 
 @kernel
-def _trial_cost(
+def trial_cost(
     terms: Terms, online: OnlineStep, column: int, angle_deg: float, speed_deg_s: float, acceleration_deg_s2: float
 ) -> float:
     """Return what one step and the way on from its end cost; infinite where there is none."""

@@ -1,36 +1,83 @@
 """From a scan to the best plan: its maps, a problem for each arm configuration, and the planner's answers."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 from planner.cell.scan import Scan
 from planner.kinematics.configuration import Configuration
 from planner.map.map_builder import build_maps, is_compiled
+from planner.map.map_file import MAP_FILE, save_maps
 from planner.map.map_problem import map_problem
 from planner.planning.arm_motion import ArmMotion, arm_motion
 from planner.planning.best_configuration import Comparison, best_configuration
 from planner.planning.compiling import compiling_beside
-from planner.planning.plan import Plan, Planner
+from planner.planning.plan import Outcome, Plan, Planner
+from planner.planning.plan_file import PLAN_FILE, plan_document, save_plan
 from planner.planning.problem import Problem
 from planner.planning.scan_problem import scan_problem
+from planner.planning.verification import Verification, verify
 from protocol.progress import ProgressOf
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedScan:
+    """A scan with the plan of its best arm configuration.
+
+    Attributes:
+        scan: What is scanned.
+        problem: Map, limits and weights of that configuration.
+        plan: The table's motion.
+        arm: The arm's motion that belongs to it.
+        outcomes: What the planner answered in each configuration, by name.
+    """
+
+    scan: Scan
+    problem: Problem
+    plan: Plan
+    arm: ArmMotion
+    outcomes: dict[str, Outcome]
+
+    @property
+    def verification(self) -> Verification:
+        """What the execution of the plan would meet."""
+        return verify(self.problem, self.plan)
+
+    @property
+    def is_executable(self) -> bool:
+        """Whether the table can carry the plan out, nothing forbidden is met, and the arm can follow."""
+        return self.verification.is_executable and self.arm.step is None
+
+    def save(self, folder: str | Path) -> Path:
+        """Write `plan.json` and `map.npz` into a folder, and return the first: what `python -m planner run` takes.
+
+        Raises:
+            OSError: They cannot be written.
+        """
+        plan_file = Path(folder) / PLAN_FILE
+        plan_file.parent.mkdir(parents=True, exist_ok=True)
+        save_plan(plan_file, plan_document(self.scan, self.problem, self.plan, self.arm))
+        save_maps(plan_file.with_name(MAP_FILE), {Configuration.parse(self.plan.configuration): self.problem.map})
+        return plan_file
 
 
 class ScanPlans(NamedTuple):
     """What was planned for a scan, by configuration."""
 
+    scan: Scan
     problems: Mapping[str, Problem]
     comparison: Comparison
 
     @property
-    def best(self) -> tuple[Problem, Plan, ArmMotion] | None:
+    def best(self) -> PlannedScan | None:
         """The best plan with its problem and the motion of the arm; None where there is no plan."""
         if self.comparison.best is None:
             return None
         problem, plan = self.problems[self.comparison.best], self.comparison.outcomes[self.comparison.best]
         assert isinstance(plan, Plan)
         assert problem.arm is not None
-        return problem, plan, arm_motion(problem.arm, plan)
+        return PlannedScan(self.scan, problem, plan, arm_motion(problem.arm, plan), dict(self.comparison.outcomes))
 
 
 def plan_scan(
@@ -62,4 +109,4 @@ def plan_scan(
         maps = build_maps(problem, asked, angle_count, progress("map" if is_compiled() else "map (compiling, once)"))
         wait()
     problems = {each.label: scan_problem(scan, map_, start_angle_deg) for each, map_ in maps.items()}
-    return ScanPlans(problems, best_configuration(problems, planner, progress("plan")))
+    return ScanPlans(scan, problems, best_configuration(problems, planner, progress("plan")))

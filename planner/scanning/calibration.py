@@ -66,7 +66,7 @@ class AxisCalibration:
 
 
 def calibrate_table_axis(
-    centres_B: FloatArray,
+    centers_B: FloatArray,
     angles_deg: FloatArray,
     nominal_T_BT: FloatArray,
     greatest_rms_mm: float = 0.2,
@@ -83,7 +83,7 @@ def calibrate_table_axis(
     more than `GREATEST_POINT_ERROR_MM`. The residuals are tested for a sphere that moved on the table.
 
     Args:
-        centres_B: Centers in the base, `(n, 3)` in mm, in the order in which they were taken.
+        centers_B: Centers in the base, `(n, 3)` in mm, in the order in which they were taken.
         angles_deg: The table's angle at each, `(n,)`.
         nominal_T_BT: About where the table is.
         greatest_rms_mm: A worse fit is refused.
@@ -94,15 +94,15 @@ def calibrate_table_axis(
     Raises:
         CalibrationError: The centers do not determine the axis well enough, or do not lie as on a turning table.
     """
-    _check_angles(centres_B, angles_deg)
+    _check_angles(centers_B, angles_deg)
     if noise_mm is not None:
         check_noise(noise_mm)
-    start, seat_T = _start(centres_B, angles_deg, nominal_T_BT)
+    start, seat_T = _start(centers_B, angles_deg, nominal_T_BT)
 
     def residuals(unknown: FloatArray) -> FloatArray:
         T_BT = _tilted(start, unknown[_AXIS])
         on_circle = rotations_z(angles_deg)[:, :3, :3] @ unknown[_SEAT]
-        return np.asarray((on_circle @ T_BT[:3, :3].T + T_BT[:3, 3] - centres_B).ravel())
+        return np.asarray((on_circle @ T_BT[:3, :3].T + T_BT[:3, 3] - centers_B).ravel())
 
     fit = least_squares(residuals, np.concatenate((np.zeros(4), seat_T)), x_scale="jac")
     T_BT = _tilted(start, fit.x[_AXIS])
@@ -110,7 +110,7 @@ def calibrate_table_axis(
     rms_mm = float(np.sqrt(np.mean(each_mm**2)))
     if rms_mm > greatest_rms_mm:
         raise CalibrationError(
-            f"the sphere's centres lie {rms_mm:.3f} mm (rms) off a turning table's circle; allowed are"
+            f"the sphere's centers lie {rms_mm:.3f} mm (rms) off a turning table's circle; allowed are"
             f" {greatest_rms_mm:g} mm: were the sphere or the table's foot loose, or the angles not those of the views?"
         )
     freedom = len(fit.fun) - len(fit.x)
@@ -124,11 +124,11 @@ def calibrate_table_axis(
     return AxisCalibration(_placed_on_axis(nominal_T_BT, T_BT[:3, 3], T_BT[:3, 2]), each_mm, rms_mm, *uncertainty)
 
 
-def _start(centres_B: FloatArray, angles_deg: FloatArray, nominal_T_BT: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _start(centers_B: FloatArray, angles_deg: FloatArray, nominal_T_BT: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return about where the table is, and where the sphere sits on it, from a linear fit."""
     theta = np.radians(angles_deg)
     design = np.column_stack((np.ones_like(theta), np.cos(theta), np.sin(theta)))
-    middle, u, v = np.linalg.lstsq(design, centres_B, rcond=None)[0]
+    middle, u, v = np.linalg.lstsq(design, centers_B, rcond=None)[0]
     axis = np.cross(u, v)
     radius_mm = float(np.sqrt(np.linalg.norm(axis)))
     if radius_mm < _SMALLEST_CIRCLE_MM:
@@ -137,7 +137,7 @@ def _start(centres_B: FloatArray, angles_deg: FloatArray, nominal_T_BT: FloatArr
             f" put it at least {_SMALLEST_CIRCLE_MM:g} mm off the table's axis"
         )
     start = _placed_on_axis(nominal_T_BT, middle, axis / np.linalg.norm(axis))
-    seats_T = rotations_z(-angles_deg)[:, :3, :3] @ ((centres_B - start[:3, 3]) @ start[:3, :3])[:, :, np.newaxis]
+    seats_T = rotations_z(-angles_deg)[:, :3, :3] @ ((centers_B - start[:3, 3]) @ start[:3, :3])[:, :, np.newaxis]
     return start, seats_T.mean(axis=0).ravel()
 
 
@@ -152,12 +152,12 @@ def _check_residuals(
     # What is far below any sphere's noise is rounding, whatever its order.
     if change is not None and (noise_mm is not None or rms_mm > 0.1 * _LEAST_NOISE_MM):
         raise CalibrationError(
-            f"the sphere's centres lie {rms_mm:.3f} mm (rms) off a turning table's circle, and {_what_changed(change)}"
+            f"the sphere's centers lie {rms_mm:.3f} mm (rms) off a turning table's circle, and {_what_changed(change)}"
         )
     if noise_mm is not None and stats.chi2.sf(equations.chi_square, equations.freedom) < _ALARMS_EACH:
         ratio = np.sqrt(equations.chi_square / equations.freedom)
         raise CalibrationError(
-            f"the sphere's centres lie {rms_mm:.3f} mm (rms) off a turning table's circle, {ratio:.1f} times their"
+            f"the sphere's centers lie {rms_mm:.3f} mm (rms) off a turning table's circle, {ratio:.1f} times their"
             " noise: were the sphere or the table's foot loose, or the angles not those of the views?"
         )
 
@@ -166,8 +166,8 @@ def _what_changed(change: Change) -> str:
     if change.kind == "drift":
         return "the sphere drifts on the table: is it fixed, does the cell still warm up?"
     if change.kind == "step":
-        return f"the sphere is elsewhere from centre {change.group + 1} on: did it move on the table?"
-    return f"centre {change.group + 1} does not agree with the others: is its angle right?"
+        return f"the sphere is elsewhere from center {change.group + 1} on: did it move on the table?"
+    return f"center {change.group + 1} does not agree with the others: is its angle right?"
 
 
 def _uncertainty(covariance: FloatArray, part: PartSize) -> tuple[float, float, float]:
@@ -182,7 +182,7 @@ def _uncertainty(covariance: FloatArray, part: PartSize) -> tuple[float, float, 
     )
     if not error_mm <= GREATEST_POINT_ERROR_MM:
         raise CalibrationError(
-            f"the centres leave the table's axis open by {shift_mm:.2g} mm and {np.degrees(tilt_rad):.2g} deg (1 sigma)"
+            f"the centers leave the table's axis open by {shift_mm:.2g} mm and {np.degrees(tilt_rad):.2g} deg (1 sigma)"
             f"; a point of a part of {part.radius_mm:g} mm radius and {part.height_mm:g} mm height is then"
             f" {error_mm:.2g} mm wrong, and allowed are {GREATEST_POINT_ERROR_MM:g} mm: spread the table angles,"
             " or put the sphere farther off the axis"
@@ -190,14 +190,14 @@ def _uncertainty(covariance: FloatArray, part: PartSize) -> tuple[float, float, 
     return shift_mm, float(np.degrees(tilt_rad)), error_mm
 
 
-def _check_angles(centres_B: FloatArray, angles_deg: FloatArray) -> None:
-    if len(centres_B) != len(angles_deg) or len(angles_deg) < _FEWEST_PLACES:
+def _check_angles(centers_B: FloatArray, angles_deg: FloatArray) -> None:
+    if len(centers_B) != len(angles_deg) or len(angles_deg) < _FEWEST_PLACES:
         raise CalibrationError(
-            f"there are {len(centres_B)} sphere centres and {len(angles_deg)} table angles;"
+            f"there are {len(centers_B)} sphere centers and {len(angles_deg)} table angles;"
             f" the axis needs as many of either, and at least {_FEWEST_PLACES}"
         )
-    if not (np.isfinite(centres_B).all() and np.isfinite(angles_deg).all()):
-        raise CalibrationError("a sphere centre or a table angle is not a finite number")
+    if not (np.isfinite(centers_B).all() and np.isfinite(angles_deg).all()):
+        raise CalibrationError("a sphere center or a table angle is not a finite number")
     arc_deg = _shortest_arc_deg(angles_deg)
     if arc_deg < _SHORTEST_ARC_DEG:
         raise CalibrationError(

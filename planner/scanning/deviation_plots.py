@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from planner.arrays import FloatArray, IndexArray
 from planner.geometry.ray_casting import RayCaster
 from planner.plot_style import new_figure, styled
-from planner.scanning.error_account import Account
+from planner.scanning.error_budget import ErrorBudget
 from planner.scanning.part_view import BARE, VIEWS, View
 
 _SIGMA_CELLS = 4.0
@@ -54,9 +54,9 @@ class Panel(NamedTuple):
 
 
 @styled()
-def deviation_figure(mesh: trimesh.Trimesh, account: Account) -> Figure:
+def deviation_figure(mesh: trimesh.Trimesh, budget: ErrorBudget) -> Figure:
     """Return the deviation of a cloud from its part: unrolled where that is round, else from two sides."""
-    points, errors_um = account.points_W, 1e3 * account.errors_mm
+    points, errors_um = budget.points_W, 1e3 * budget.errors_mm
     axis = axis_of_revolution(mesh)
     panels = _seen(mesh, points, errors_um) if axis is None else unrolled(mesh, axis, points, errors_um)
     shown = np.concatenate([panel.deviation_um[np.isfinite(panel.deviation_um)] for panel in panels])

@@ -18,7 +18,7 @@ from planner.arrays import FloatArray, IndexArray
 # Over which the planned speed is taken, and below which it shows no lag.
 _STEP_S, _SLOW_DEG_S = 0.005, 1.0
 # How many readings before and after tell how far the table is off its plan at a trigger.
-_NEIGHBOURS = 7
+_NEIGHBORS = 7
 
 
 class Trigger(NamedTuple):
@@ -170,7 +170,7 @@ def _strays(
     off_deg = off_deg + _lag_s(off_deg, speeds_deg_s) * speeds_deg_s
     stray = set()
     for k, trigger in enumerate(read):
-        around = off_deg[max(0, k - _NEIGHBOURS) : k + _NEIGHBOURS + 1]
+        around = off_deg[max(0, k - _NEIGHBORS) : k + _NEIGHBORS + 1]
         if abs(off_deg[k] - float(np.median(around))) > tolerance_deg:
             stray.add(trigger.number)
     return stray

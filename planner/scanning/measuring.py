@@ -10,7 +10,7 @@ from planner.geometry.ray_casting import RayCaster
 from planner.geometry.thinned_cloud import ThinnedCloud
 from planner.scanning.alignment import aligned, probe_poses
 from planner.scanning.coverage import Coverage
-from planner.scanning.error_account import Chain, Samples
+from planner.scanning.error_budget import Chain, Samples
 from planner.scanning.point_cloud import PlyWriter, XyzWriter
 from planner.scanning.probe import LaserProbe, measure
 from protocol.progress import Progress

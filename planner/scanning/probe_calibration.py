@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from planner.arrays import FloatArray
 from planner.scanning.calibration import GREATEST_POINT_ERROR_MM, CalibrationError, check_noise
-from planner.scanning.probe_fit import CENTRE, RADIUS, SHIFT, TURN, ProbeFit, Views, fit_heights, fit_rays
+from planner.scanning.probe_fit import CENTER, RADIUS, SHIFT, TURN, ProbeFit, Views, fit_heights, fit_rays
 from planner.scanning.score_tests import FALSE_ALARMS, Change, NormalEquations, find_change
 
 # The least that determines a place and says how well.
@@ -39,7 +39,7 @@ class ProbeCalibration:
 
     Attributes:
         T_FS: The probe on the flange, `(4, 4)`.
-        centre_B_mm: The reference sphere's center in the base, `(3,)`.
+        center_B_mm: The reference sphere's center in the base, `(3,)`.
         residuals_mm: `(m,)` height of each point above the sphere.
         rms_mm: Their root mean square.
         noise_ratio: Root of chi-square over its degrees of freedom: the residual in units of the probe's noise.
@@ -53,7 +53,7 @@ class ProbeCalibration:
     """
 
     T_FS: FloatArray
-    centre_B_mm: FloatArray
+    center_B_mm: FloatArray
     residuals_mm: FloatArray
     rms_mm: float
     noise_ratio: float
@@ -76,7 +76,7 @@ def calibrate_probe(
 ) -> ProbeCalibration:
     """Return the probe's place on the flange from views of a sphere that stands still, of known radius.
 
-    The points of all views must lie at the radius from one centre: |T_BF T_FS p - c| = r. Profiles of a sphere are
+    The points of all views must lie at the radius from one center: |T_BF T_FS p - c| = r. Profiles of a sphere are
     circles, and a circle does not say on which side of it the center is; so a single guess can end in a false minimum.
     The search starts from the nominal place turned into each of the 24 directions of a cube; the best end counts.
 
@@ -102,7 +102,7 @@ def calibrate_probe(
     found = [fit_heights(thinned, radius_mm, guess) for guess in cube_turns(nominal_T_FS)]
     best = min(found, key=lambda end: end.rms_mm)
     mirrored = _beyond_the_plane(thinned, best)
-    found.append(fit_heights(thinned, radius_mm, mirrored, best.centre))
+    found.append(fit_heights(thinned, radius_mm, mirrored, best.center))
     views = Views.of(T_BF, points_S)
     fit = fit_rays(views, best, noise_mm)
     free = fit_rays(views, fit, noise_mm, radius_is_known=False)
@@ -134,7 +134,7 @@ def calibrate_probe(
         )
     return ProbeCalibration(
         T_FS=fit.T_FS,
-        centre_B_mm=fit.centre,
+        center_B_mm=fit.center,
         residuals_mm=fit.heights_mm,
         rms_mm=fit.rms_mm,
         noise_ratio=ratio,
@@ -156,7 +156,7 @@ def _check_residuals(views: Views, fit: ProbeFit, free_radius_mm: float, radius_
     equations = NormalEquations.of(fit.residuals, fit.jacobian, views.view)
     ratio = float(np.sqrt(equations.chi_square / max(1, equations.freedom)))
     off = f"the points lie {fit.rms_mm:.3f} mm (rms) off one sphere of radius {fit.radius_mm:g} mm"
-    change = find_change(equations, CENTRE, _ALARMS_EACH, noise_is_known=True)
+    change = find_change(equations, CENTER, _ALARMS_EACH, noise_is_known=True)
     if stats.chi2.sf(radius_score, 1) < _ALARMS_EACH and (change is None or radius_score > change.statistic):
         raise CalibrationError(
             f"{off}, and fit one of {free_radius_mm:.3f} mm better: is this the sphere, is its radius in mm?"
@@ -186,7 +186,7 @@ def _beyond_the_plane(views: Views, fit: ProbeFit) -> FloatArray:
 
     Where the line always passes the sphere on the same side, that place fits as well.
     """
-    in_F = np.einsum("nji,nj->ni", views.R, fit.centre - views.t)
+    in_F = np.einsum("nji,nj->ni", views.R, fit.center - views.t)
     aside_mm = float(np.mean((in_F - fit.T_FS[:3, 3]) @ fit.T_FS[:3, 1]))
     mirrored = fit.T_FS.copy()
     mirrored[:3, 3] += 2.0 * aside_mm * fit.T_FS[:3, 1]

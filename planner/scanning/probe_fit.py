@@ -13,7 +13,7 @@ from planner.arrays import FloatArray, IndexArray
 _LEAST_COSINE = 0.2
 _SEARCH_EVALUATIONS = 60
 
-TURN, SHIFT, CENTRE, RADIUS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 10)
+TURN, SHIFT, CENTER, RADIUS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 10)
 """The unknowns: turn (rad) and shift (mm) of the probe on the flange, the sphere's center and radius (mm)."""
 
 
@@ -46,15 +46,15 @@ class ProbeFit:
 
     Attributes:
         T_FS: The probe on the flange, `(4, 4)`.
-        centre: The sphere's center in the base, `(3,)`.
+        center: The sphere's center in the base, `(3,)`.
         radius_mm: The sphere's radius, as given or as found.
         heights_mm: `(m,)` height of each point above the sphere.
-        residuals: `(m,)` what was minimised: the heights, or the errors along the rays in units of the noise.
+        residuals: `(m,)` what was minimized: the heights, or the errors along the rays in units of the noise.
         jacobian: `(m, 9)` or `(m, 10)` derivatives of the residuals.
     """
 
     T_FS: FloatArray
-    centre: FloatArray
+    center: FloatArray
     radius_mm: float
     heights_mm: FloatArray
     residuals: FloatArray
@@ -92,14 +92,14 @@ class _Sphere:
         return np.asarray(np.einsum("nij,nj->ni", self._views.R, on_flange) + self._views.t)
 
     def heights(self, unknown: FloatArray) -> FloatArray:
-        return np.asarray(np.linalg.norm(self.in_base(unknown) - unknown[CENTRE], axis=1) - self.radius_mm(unknown))
+        return np.asarray(np.linalg.norm(self.in_base(unknown) - unknown[CENTER], axis=1) - self.radius_mm(unknown))
 
     def distances(self, unknown: FloatArray) -> FloatArray:
         """Return where along each ray it meets the sphere; of a ray that passes by, about where it is nearest."""
-        centre_F = np.einsum("nji,nj->ni", self._views.R, unknown[CENTRE] - self._views.t)
-        centre_S = (centre_F - unknown[SHIFT]) @ self.direction(unknown)
-        along = np.einsum("ni,ni->n", centre_S, self._rays)
-        inside2 = self.radius_mm(unknown) ** 2 - np.einsum("ni,ni->n", centre_S, centre_S) + along**2
+        center_F = np.einsum("nji,nj->ni", self._views.R, unknown[CENTER] - self._views.t)
+        center_S = (center_F - unknown[SHIFT]) @ self.direction(unknown)
+        along = np.einsum("ni,ni->n", center_S, self._rays)
+        inside2 = self.radius_mm(unknown) ** 2 - np.einsum("ni,ni->n", center_S, center_S) + along**2
         return np.asarray(along - np.sqrt(np.maximum(inside2, (_LEAST_COSINE * self.radius_mm(unknown)) ** 2)))
 
     def height_slopes(self, unknown: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -107,7 +107,7 @@ class _Sphere:
         direction = self.direction(unknown)
         turned = points @ direction.T
         in_base = np.einsum("nij,nj->ni", self._views.R, turned + unknown[SHIFT]) + self._views.t
-        radial = in_base - unknown[CENTRE]
+        radial = in_base - unknown[CENTER]
         radial /= np.linalg.norm(radial, axis=1, keepdims=True)
         on_flange = np.einsum("nji,nj->ni", self._views.R, radial)
         turning = np.cross(turned, on_flange) @ _left_jacobian(unknown[TURN])
@@ -127,7 +127,7 @@ class _Sphere:
         return np.asarray(slopes / np.minimum(along, -_LEAST_COSINE)[:, np.newaxis])
 
 
-def fit_heights(views: Views, radius_mm: float, guess: FloatArray, centre: FloatArray | None = None) -> ProbeFit:
+def fit_heights(views: Views, radius_mm: float, guess: FloatArray, center: FloatArray | None = None) -> ProbeFit:
     """Return where a quick fit of the points' heights above the sphere comes to, from a guess of T_FS.
 
     It converges from far away, but noise along a slanting ray moves it a little: the square of the noise over the
@@ -137,12 +137,12 @@ def fit_heights(views: Views, radius_mm: float, guess: FloatArray, centre: Float
         views: The points.
         radius_mm: The sphere's radius.
         guess: T_FS to start from.
-        centre: The sphere's center to start from; the middle of the points where left out.
+        center: The sphere's center to start from; the middle of the points where left out.
     """
     sphere = _Sphere(views, guess, radius_mm)
-    if centre is None:
-        centre = sphere.in_base(np.concatenate((np.zeros(3), guess[:3, 3]))).mean(axis=0)
-    start = np.concatenate((np.zeros(3), guess[:3, 3], centre))
+    if center is None:
+        center = sphere.in_base(np.concatenate((np.zeros(3), guess[:3, 3]))).mean(axis=0)
+    start = np.concatenate((np.zeros(3), guess[:3, 3], center))
     end = least_squares(sphere.heights, start, sphere.height_jacobian, method="lm", max_nfev=_SEARCH_EVALUATIONS).x
     return _ended(sphere, end, sphere.heights(end), sphere.height_jacobian(end))
 
@@ -164,7 +164,7 @@ def fit_rays(views: Views, start: ProbeFit, noise_mm: float, radius_is_known: bo
     def jacobian(unknown: FloatArray) -> FloatArray:
         return np.asarray(sphere.ray_jacobian(unknown) / noise_mm)
 
-    unknown = [np.zeros(3), start.T_FS[:3, 3], start.centre, np.full(0 if radius_is_known else 1, start.radius_mm)]
+    unknown = [np.zeros(3), start.T_FS[:3, 3], start.center, np.full(0 if radius_is_known else 1, start.radius_mm)]
     end = least_squares(residuals, np.concatenate(unknown), jacobian, method="lm").x
     return _ended(sphere, end, residuals(end), jacobian(end))
 
@@ -173,7 +173,7 @@ def _ended(sphere: _Sphere, end: FloatArray, residuals: FloatArray, jacobian: Fl
     T_FS = np.eye(4)
     T_FS[:3, :3] = sphere.direction(end)
     T_FS[:3, 3] = end[SHIFT]
-    return ProbeFit(T_FS, end[CENTRE], sphere.radius_mm(end), sphere.heights(end), residuals, jacobian)
+    return ProbeFit(T_FS, end[CENTER], sphere.radius_mm(end), sphere.heights(end), residuals, jacobian)
 
 
 def _left_jacobian(turn: FloatArray) -> FloatArray:

@@ -40,16 +40,16 @@ class Sweep(NamedTuple):
 
 
 def profile_of_sphere(
-    probe: LaserProbe, T_BS: FloatArray, centre_B: FloatArray, radius_mm: float, rng: np.random.Generator
+    probe: LaserProbe, T_BS: FloatArray, center_B: FloatArray, radius_mm: float, rng: np.random.Generator
 ) -> FloatArray:
     """Return the points `(m, 3)` in frame S that a probe at T_BS measures of a sphere.
 
     A camera sees what the laser strikes: nothing else is there, and beyond the incidence limit nothing is measured.
     """
     rays = probe.rays()
-    centre = (centre_B - T_BS[:3, 3]) @ T_BS[:3, :3]
-    along = rays @ centre
-    inside2 = along**2 - centre @ centre + radius_mm**2
+    center = (center_B - T_BS[:3, 3]) @ T_BS[:3, :3]
+    along = rays @ center
+    inside2 = along**2 - center @ center + radius_mm**2
     with np.errstate(invalid="ignore"):
         distances = along - np.sqrt(inside2)
         cosines = np.sqrt(inside2) / radius_mm
@@ -61,16 +61,16 @@ def profile_of_sphere(
 
 
 def sweep(
-    probe: LaserProbe, views_BS: FloatArray, T_FS: FloatArray, centre_B: FloatArray, rng: np.random.Generator
+    probe: LaserProbe, views_BS: FloatArray, T_FS: FloatArray, center_B: FloatArray, rng: np.random.Generator
 ) -> Sweep:
     """Return profiles of the sphere from each of the poses `(n, 4, 4)`, moved across the line in small steps."""
     steps = np.stack([placement(0.0, step, 0.0, 0.0, 0.0, 0.0) for step in _SWEEP_MM])
     poses = (views_BS[:, np.newaxis] @ steps).reshape(-1, 4, 4)
-    points = [profile_of_sphere(probe, T, centre_B, _RADIUS_MM, rng) for T in poses]
+    points = [profile_of_sphere(probe, T, center_B, _RADIUS_MM, rng) for T in poses]
     return Sweep(poses @ rigid_inverse(T_FS), points)
 
 
-def views_of(centre_B: FloatArray, count: int, probe: LaserProbe) -> FloatArray:
+def views_of(center_B: FloatArray, count: int, probe: LaserProbe) -> FloatArray:
     """Return probe poses `(count, 4, 4)` all round the upper side of a sphere, turned about their beams as well.
 
     The sphere is off the line's middle and at varying depth: always in the middle, the probe turned round about its
@@ -83,7 +83,7 @@ def views_of(centre_B: FloatArray, count: int, probe: LaserProbe) -> FloatArray:
     lines = np.column_stack((np.cos(roll), np.sin(roll), 0.3 * np.ones(count)))
     middle_mm, span_mm = 0.5 * (probe.nearest_mm + probe.farthest_mm), probe.farthest_mm - probe.nearest_mm
     depths_mm = middle_mm + 0.2 * span_mm * np.cos(2.0 * number)
-    poses = looking_at(np.tile(centre_B, (count, 1)), normals, lines, 0.0)
+    poses = looking_at(np.tile(center_B, (count, 1)), normals, lines, 0.0)
     poses[:, :3, 3] += (depths_mm + _RADIUS_MM)[:, np.newaxis] * normals
     poses[:, :3, 3] += 10.0 * np.where(number % 3, 1.0, -1.0)[:, np.newaxis] * poses[:, :3, 0]
     return poses
@@ -103,20 +103,20 @@ def calibrate_cell(
     """
     rng = np.random.default_rng((seed, 8))
     noise_mm = max(probe.noise_mm, 1e-3)
-    centre = (true.T_BT @ np.array((*_SEAT_T_MM, 1.0)))[:3]
-    seen = sweep(probe, views_of(centre, 20, probe), true.T_FS, centre, rng)
+    center = (true.T_BT @ np.array((*_SEAT_T_MM, 1.0)))[:3]
+    seen = sweep(probe, views_of(center, 20, probe), true.T_FS, center, rng)
     on_flange = calibrate_probe(seen.T_BF, seen.points_S, _RADIUS_MM, nominal.T_FS, noise_mm)
 
     angles_deg = np.arange(_TABLE_ANGLES) * 360.0 / _TABLE_ANGLES
-    centres = []
+    centers = []
     for T_turn in rotations_z(angles_deg):
         turned = (true.T_BT @ T_turn @ np.array((*_SEAT_T_MM, 1.0)))[:3]
         views = sweep(probe, views_of(turned, 3, probe), true.T_FS, turned, rng)
         T_BS = views.T_BF @ on_flange.T_FS
         in_base = [points @ T[:3, :3].T + T[:3, 3] for T, points in zip(T_BS, views.points_S, strict=True)]
-        centres.append(fit_sphere(np.concatenate(in_base), _RADIUS_MM, noise_mm))
-    centre_noise_mm = float(np.sqrt(np.mean([centre.deviations_mm**2 for centre in centres])))
+        centers.append(fit_sphere(np.concatenate(in_base), _RADIUS_MM, noise_mm))
+    center_noise_mm = float(np.sqrt(np.mean([center.deviations_mm**2 for center in centers])))
     axis = calibrate_table_axis(
-        np.array([each.centre for each in centres]), angles_deg, nominal.T_BT, noise_mm=centre_noise_mm, part=part
+        np.array([each.center for each in centers]), angles_deg, nominal.T_BT, noise_mm=center_noise_mm, part=part
     )
     return CellCalibration(axis, on_flange, Calibration(on_flange.T_FS, axis.T_BT, nominal.T_TW))

@@ -13,8 +13,8 @@ _FORMAT_VERSION = 1
 
 
 def scan_document(scanned: Scanned) -> dict[str, Any]:
-    """Return a scan as JSON can hold it: what was asked, what was latched, and the account."""
-    options, run, accounted = scanned.options, scanned.run, scanned.account
+    """Return a scan as JSON can hold it: what was asked, what was latched, and the error budget."""
+    options, run, budget = scanned.options, scanned.run, scanned.budget
     return {
         "format": _FORMAT,
         "format_version": _FORMAT_VERSION,
@@ -32,15 +32,15 @@ def scan_document(scanned: Scanned) -> dict[str, Any]:
         "configuration": scanned.planned.plan.configuration,
         "failure": run.failure or ("interrupted" if scanned.is_interrupted else None),
         "points": scanned.points,
-        "distance_mm": accounted.distances._asdict(),
+        "distance_mm": budget.distances._asdict(),
         "error_mm": {
-            "parts": {str(part): share._asdict() for part, share in accounted.parts.items()},
-            "together": accounted.total._asdict(),
-            "root_of_squares": accounted.sum_mm,
-            "all_off": accounted.none_mm,
-            "rounding_in_closed_form": accounted.rounding_mm,
-            "radius_mm": accounted.radius_mm,
-            "samples": accounted.samples,
+            "parts": {str(part): share._asdict() for part, share in budget.parts.items()},
+            "together": budget.total._asdict(),
+            "root_of_squares": budget.sum_mm,
+            "all_off": budget.none_mm,
+            "rounding_in_closed_form": budget.rounding_mm,
+            "radius_mm": budget.radius_mm,
+            "samples": budget.samples,
         },
         "coverage": {code.name.lower(): share for code, share in scanned.coverage.shares().items()},
         "calibration": _calibration(scanned.knowledge),

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from planner.geometry.ray_casting import RayCaster
 from planner.plot_style import AMBER, BLUE, GRAY, GREEN, INK, PALE, VERMILION, new_figure, styled
 from planner.scanning.coverage import Coverage
-from planner.scanning.error_account import Account
+from planner.scanning.error_budget import ErrorBudget
 from planner.scanning.part_view import VIEWS, View, painted
 from planner.scanning.probe import Sight
 
@@ -50,12 +50,12 @@ def coverage_figure(mesh: trimesh.Trimesh, coverage: Coverage) -> Figure:
 
 
 @styled()
-def account_figure(account: Account) -> Figure:
+def budget_figure(budget: ErrorBudget) -> Figure:
     """Return how far each part alone moves the points, and how the distances are distributed."""
     figure = new_figure(3.3)
     bars, spread = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
-    names = [*account.parts, "all together"]
-    shares = [*((part.displacement_mm, part.across_mm) for part in account.parts.values()), account.total]
+    names = [*budget.parts, "all together"]
+    shares = [*((part.displacement_mm, part.across_mm) for part in budget.parts.values()), budget.total]
     place = np.arange(len(names))[::-1]
     bars.barh(place + 0.19, [1e3 * moved for moved, _ in shares], 0.36, color=BLUE, label="displacement")
     bars.barh(
@@ -68,8 +68,8 @@ def account_figure(account: Account) -> Figure:
     bars.set_yticks(place, names)
     bars.set_xlabel("root mean square (µm)")
     bars.legend(loc="best")
-    errors_um = 1e3 * account.errors_mm
-    mean, sigma = 1e3 * account.distances.mean, 1e3 * account.distances.sigma
+    errors_um = 1e3 * budget.errors_mm
+    mean, sigma = 1e3 * budget.distances.mean, 1e3 * budget.distances.sigma
     span = max(4.0 * sigma, 1e-3)
     grid = np.linspace(mean - span, mean + span, 81)
     spread.hist(errors_um, bins=grid, density=True, color=PALE)

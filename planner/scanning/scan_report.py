@@ -1,4 +1,4 @@
-"""A scan as one HTML page: verdict, cloud, error account, coverage, and what went missing."""
+"""A scan as one HTML page: verdict, cloud, error budget, coverage, and what went missing."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -7,15 +7,15 @@ from planner.plot_style import svg_of
 from planner.scanning.calibration import AxisCalibration
 from planner.scanning.coverage import REASONS
 from planner.scanning.deviation_plots import deviation_figure
-from planner.scanning.error_account import Account, Contribution
+from planner.scanning.error_budget import Contribution, ErrorBudget
 from planner.scanning.measuring import COVERED_MM
 from planner.scanning.probe import Sight
 from planner.scanning.probe_calibration import ProbeCalibration
-from planner.scanning.scan_plots import STATE_NAMES, account_figure, coverage_figure
+from planner.scanning.scan_plots import STATE_NAMES, budget_figure, coverage_figure
 from planner.scanning.scan_run import Scanned
 from protocol.page import Origin, counted, figure, heading, page, paragraph, table, verdict
 
-_MICROMETRES = 1e3
+_MICROMETERS = 1e3
 
 
 def scan_report(scanned: Scanned, origin: Origin | None = None) -> str:
@@ -30,19 +30,19 @@ def scan_report(scanned: Scanned, origin: Origin | None = None) -> str:
 
 def scan_blocks(scanned: Scanned) -> tuple[str, ...]:
     """Return the parts of the page that tell of the cloud, its errors, coverage, calibration and profiles."""
-    mesh, accounted = scanned.scan.mesh, scanned.account
+    mesh, budget = scanned.scan.mesh, scanned.budget
     return (
         heading("The cloud"),
         paragraph("Color is how far the cloud lies from the surface, averaged nearby; gray was not measured."),
         figure(
-            svg_of(deviation_figure(mesh, accounted)),
-            f"Deviation of the cloud from the surface; {_um(accounted.distances.greatest)} µm at most at one point.",
+            svg_of(deviation_figure(mesh, budget)),
+            f"Deviation of the cloud from the surface; {_um(budget.distances.greatest)} µm at most at one point.",
         ),
-        table(("", "mean (µm)", "sigma (µm)", "95 % within (µm)", "maximum (µm)"), [_distances(accounted)]),
+        table(("", "mean (µm)", "sigma (µm)", "95 % within (µm)", "maximum (µm)"), [_distances(budget)]),
         heading("Where the error comes from"),
         paragraph(_explanation(scanned)),
-        figure(svg_of(account_figure(accounted)), "What each source of error contributes; distribution of distances."),
-        _account_table(accounted),
+        figure(svg_of(budget_figure(budget)), "What each source of error contributes; distribution of distances."),
+        _budget_table(budget),
         paragraph(_rounding(scanned)),
         heading("Coverage"),
         paragraph(
@@ -63,13 +63,13 @@ def scan_blocks(scanned: Scanned) -> tuple[str, ...]:
 
 def verdict_of(scanned: Scanned) -> str:
     """Return what a scan came to in one sentence."""
-    accounted, seen = scanned.account, scanned.coverage.shares()[Sight.SEEN]
+    budget, seen = scanned.budget, scanned.coverage.shares()[Sight.SEEN]
     ended = ""
     if scanned.run.failure is not None:
         ended = f" It ended early: {scanned.run.failure}."
     elif scanned.is_interrupted:
         ended = " It was interrupted."
-    distances, moved = accounted.distances, accounted.total.displacement_mm
+    distances, moved = budget.distances, budget.total.displacement_mm
     return (
         f"{scanned.points:,} points from {counted(len(scanned.run.numbers), 'profile')}: {_um(distances.sigma)} µm"
         f" (1 sigma) from the surface, {_um(distances.greatest)} µm at most, {_um(moved)} µm (rms) from where they"
@@ -78,7 +78,7 @@ def verdict_of(scanned: Scanned) -> str:
 
 
 def _um(length_mm: float, decimals: int = 1) -> str:
-    return f"{_MICROMETRES * length_mm:.{decimals}f}"
+    return f"{_MICROMETERS * length_mm:.{decimals}f}"
 
 
 def _summary(scanned: Scanned) -> Iterator[tuple[str, str]]:
@@ -92,9 +92,9 @@ def _summary(scanned: Scanned) -> Iterator[tuple[str, str]]:
     yield "if the line had died", f"{scanned.dead_line}"
 
 
-def _distances(accounted: Account) -> tuple[str, ...]:
-    name = f"cloud to mesh, {accounted.samples:,} points"
-    return (name, *(_um(value) for value in accounted.distances))
+def _distances(budget: ErrorBudget) -> tuple[str, ...]:
+    name = f"cloud to mesh, {budget.samples:,} points"
+    return (name, *(_um(value) for value in budget.distances))
 
 
 def _explanation(scanned: Scanned) -> str:
@@ -110,25 +110,25 @@ def _explanation(scanned: Scanned) -> str:
     return text
 
 
-def _account_table(accounted: Account) -> str:
+def _budget_table(budget: ErrorBudget) -> str:
     def row(name: str, part: Contribution) -> tuple[str, ...]:
         return name, *(_um(value, 2) for value in part)
 
-    rows = [row(str(name), part) for name, part in accounted.parts.items()]
+    rows = [row(str(name), part) for name, part in budget.parts.items()]
     rows += [
-        ("all together", _um(accounted.total.displacement_mm, 2), _um(accounted.total.across_mm, 2), ""),
-        ("root of the sum of squares", _um(accounted.sum_mm, 2), "", ""),
-        ("all switched off", f"{_MICROMETRES * accounted.none_mm:.1g}", "", ""),
+        ("all together", _um(budget.total.displacement_mm, 2), _um(budget.total.across_mm, 2), ""),
+        ("root of the sum of squares", _um(budget.sum_mm, 2), "", ""),
+        ("all switched off", f"{_MICROMETERS * budget.none_mm:.1g}", "", ""),
     ]
     return table(("rms", "displacement alone (µm)", "across the surface (µm)", "left without it (µm)"), rows, 3)
 
 
 def _rounding(scanned: Scanned) -> str:
-    accounted, decimals = scanned.account, scanned.options.decimals
+    budget, decimals = scanned.budget, scanned.options.decimals
     return (
         f"Rounding in closed form: an angle that is wrong by anything within one step of {10.0**-decimals:g} deg has"
-        f" sigma {10.0**-decimals:g}/sqrt(12) deg, which at these points' radius of {accounted.radius_mm:.1f} mm (rms)"
-        f" is {_um(accounted.rounding_mm, 2)} µm."
+        f" sigma {10.0**-decimals:g}/sqrt(12) deg, which at these points' radius of {budget.radius_mm:.1f} mm (rms)"
+        f" is {_um(budget.rounding_mm, 2)} µm."
     )
 
 
@@ -146,7 +146,7 @@ def _calibration(scanned: Scanned) -> str:
     wrong = f"{probe.wrong_starts} of {probe.starts} starts ended in a false minimum"
     radius = f"the sphere's radius fits as {probe.fitted_radius_mm:.4f} ± {probe.radius_uncertainty_mm:.4f} mm"
     rows = [
-        ("table axis", _um(axis.rms_mm), f"{len(axis.residuals_mm)} sphere centres", *_uncertainty(axis), ""),
+        ("table axis", _um(axis.rms_mm), f"{len(axis.residuals_mm)} sphere centers", *_uncertainty(axis), ""),
         ("probe on the flange", _um(probe.rms_mm), f"{len(probe.residuals_mm):,} points", *_uncertainty(probe),
          f"residual {probe.noise_ratio:.2f} times the noise; {radius}; {wrong}"),
     ]  # fmt: skip

@@ -1,7 +1,7 @@
-"""A scan from end to end: plan, move and latch, measure, align, write, account.
+"""A scan from end to end: plan, move and latch, measure, align, write, error budget.
 
 The workpiece is measured where it truly is, at the table's true angle, and aligned with what was latched: the
-difference is the error that the account takes apart.
+difference is the error that the error budget divides among its sources.
 """
 
 from collections.abc import Iterator
@@ -12,28 +12,25 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from planner.arrays import FloatArray
 from planner.cell.cell import placement
 from planner.cell.scan import Scan
 from planner.defaults import DEFAULT_PLANNER, RUN_ON_DEG
 from planner.errors import PlannerError
+from planner.execution.clear_path import check_ends
 from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.execution.execute import Settings
-from planner.execution.free_way import check_ends
+from planner.execution.run_input import RunInput
 from planner.execution.stream import check_it_fits, stream
-from planner.execution.table_motion import TableMotion
 from planner.execution.table_port import CONTROL_TIMEOUT_S, open_port
 from planner.geometry.point_normals import point_normals
 from planner.geometry.thinned_cloud import ThinnedCloud
-from planner.map.config_map import ConfigurationMap
 from planner.planning.arm_check import PlannedArm, arm_fault
-from planner.planning.plan import Plan
 from planner.planning.planners import PLANNERS
 from planner.planning.scan_planning import plan_scan
 from planner.scanning.alignment import Calibration
 from planner.scanning.calibration import AxisCalibration, PartSize
 from planner.scanning.coverage import Coverage
-from planner.scanning.error_account import Account, Chain, account
+from planner.scanning.error_budget import Chain, ErrorBudget, error_budget_of
 from planner.scanning.latched_run import LatchedRun, TriggerConditions, run_latched
 from planner.scanning.measuring import Measuring, known_poses
 from planner.scanning.point_cloud import PlyWriter, XyzWriter, write_normals
@@ -43,7 +40,6 @@ from planner.scanning.probe_calibration import ProbeCalibration
 from planner.scanning.reference_sphere import calibrate_cell
 from planner.scanning.surface_mesh import save_surface, surface_mesh
 from planner.scanning.trigger_line import ProbeByHand, ProbeOnPort, TriggerLine
-from planner.table.motion import Limits
 from planner.table.wire import Wire
 from protocol import Port, TableClient
 from protocol.bench import bench_of
@@ -87,21 +83,6 @@ class ScanOptions(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Planned:
-    """The motion of a scan: the table's plan on its map, and the arm's joints `(n + 1, 6)` in deg along it."""
-
-    plan: Plan
-    joints_deg: FloatArray
-    limits: Limits
-    map: ConfigurationMap
-
-    @property
-    def motion(self) -> TableMotion:
-        """What the table does."""
-        return TableMotion(self.plan, self.limits)
-
-
-@dataclass(frozen=True, eq=False)
 class Knowledge:
     """What the alignment knows of the cell, and from which measurements."""
 
@@ -139,12 +120,12 @@ class Scanned:
     scan: Scan
     options: ScanOptions
     probe: LaserProbe
-    planned: Planned
+    planned: RunInput
     knowledge: Knowledge
     run: LatchedRun
     points: int
     coverage: Coverage
-    account: Account
+    budget: ErrorBudget
     dead_line: DeadLine
     is_interrupted: bool
 
@@ -154,20 +135,21 @@ class Scanned:
         return self.run.failure is None and not self.is_interrupted
 
 
-def planned_scan(scan: Scan, configuration: str, angle_count: int, progress: ProgressOf) -> Planned:
+def planned_scan(scan: Scan, configuration: str, angle_count: int, progress: ProgressOf) -> RunInput:
     """Return the best motion for a scan.
 
     Raises:
         ScanError: There is none that the arm can follow.
     """
     plans = plan_scan(scan, configuration, angle_count, PLANNERS[DEFAULT_PLANNER], progress, compiled=DEFAULT_PLANNER)
-    if plans.best is None:
+    planned = plans.best
+    if planned is None:
         raise ScanError(plans.comparison.why_no_plan(scan))
-    problem, plan, motion = plans.best
-    fault = arm_fault(PlannedArm(scan.cell, scan.path.T_WS, motion.robot_deg), plan)
+    joints_deg = planned.arm.robot_deg
+    fault = arm_fault(PlannedArm(scan.cell, scan.path.T_WS, joints_deg), planned.plan)
     if fault is not None:
         raise ScanError(f"{scan.name}: the arm cannot follow the plan: {fault}")
-    return Planned(plan, motion.robot_deg, scan.limits, problem.map)
+    return RunInput(scan.name, planned.plan, planned.problem, joints_deg, scan.cell.arm)
 
 
 class TableAtPort(NamedTuple):
@@ -189,18 +171,19 @@ def table_at_port(options: ScanOptions) -> Iterator[TableAtPort]:
         yield TableAtPort(port, client)
 
 
-def check_motion(planned: Planned, options: ScanOptions) -> None:
+def check_motion(planned: RunInput, options: ScanOptions) -> None:
     """Refuse a motion that must not be made, or cannot be streamed.
 
     Raises:
         PlannerError: The table would run up or out through a forbidden region, or the commands do not fit the line.
     """
     wire = Wire(options.decimals, options.baud)
-    check_ends(planned.map, planned.motion)
-    check_it_fits(stream(planned.motion, planned.limits, wire, options.run_on_deg), wire)
+    motion = planned.motion()
+    check_ends(planned.problem.map, motion)
+    check_it_fits(stream(motion, planned.problem.limits, wire, options.run_on_deg), wire)
 
 
-def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) -> LatchedRun:
+def run_on_port(planned: RunInput, options: ScanOptions, progress: ProgressOf) -> LatchedRun:
     """Return what was latched while the table at the port made the motion.
 
     Raises:
@@ -212,14 +195,14 @@ def run_on_port(planned: Planned, options: ScanOptions, progress: ProgressOf) ->
         return run_on_table(table, planned, options, progress("motion"))
 
 
-def run_on_table(table: TableAtPort, planned: Planned, options: ScanOptions, progress: Progress | None) -> LatchedRun:
+def run_on_table(table: TableAtPort, planned: RunInput, options: ScanOptions, progress: Progress | None) -> LatchedRun:
     """Return what was latched while the table made a motion that was checked; see `run_on_port`."""
     return run_latched(
         table.client,
         _trigger_line(table.port, table.client, options),
         planned.plan,
         planned.joints_deg,
-        planned.limits,
+        planned.problem.limits,
         Wire(options.decimals, options.baud),
         options.triggers,
         Settings(lag_s=options.lag_s, run_on_deg=options.run_on_deg),
@@ -259,7 +242,7 @@ def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: Progre
     work = Measuring(scan.mesh, probe, options.seed, options.thinned_mm)
     with cloud_files(out, scan, options) as (ply, xyz):
         measured = work.take(chain, ply, xyz, progress("profiles"))
-    dead_line = judge_dead_line(planned.map, planned.motion, run.record)
+    dead_line = judge_dead_line(planned.problem.map, planned.motion(), run.record)
     return finished(scan, options, probe, planned, knowledge, run, work, ply.count, dead_line, measured.is_whole, out)
 
 
@@ -295,7 +278,7 @@ def finished(
     scan: Scan,
     options: ScanOptions,
     probe: LaserProbe,
-    planned: Planned,
+    planned: RunInput,
     knowledge: Knowledge,
     run: LatchedRun,
     work: Measuring,
@@ -318,9 +301,9 @@ def finished(
     write_poses(out / POSES_FILE, run.numbers, run.times_s, run.angles_deg, run.joints_deg, T_BF, known_poses(chain))
     if work.thinned is not None:
         _write_surface(work.thinned, scan.name, options, out)
-    accounted = account(chain, work.samples.all(), scan.mesh, 10.0**-options.decimals)
+    budget = error_budget_of(chain, work.samples.all(), scan.mesh, 10.0**-options.decimals)
     return Scanned(
-        scan, options, probe, planned, knowledge, run, points, work.coverage, accounted, dead_line, not is_whole
+        scan, options, probe, planned, knowledge, run, points, work.coverage, budget, dead_line, not is_whole
     )
 
 

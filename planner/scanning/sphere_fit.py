@@ -17,43 +17,37 @@ class SphereFit(NamedTuple):
     """A sphere of known radius through points.
 
     Attributes:
-        centre: `(3,)` in mm.
+        center: `(3,)` in mm.
         rms_mm: Root mean square of the points' heights above it.
         deviations_mm: `(3,)` standard deviation of each coordinate of the center, for heights with the given noise.
     """
 
-    centre: FloatArray
+    center: FloatArray
     rms_mm: float
     deviations_mm: FloatArray
 
 
-def sphere_centre(points: FloatArray, radius_mm: float) -> FloatArray:
-    """Return the center `(3,)` of a sphere of known radius through points `(m, 3)`, by least squares.
+def fit_sphere(points: FloatArray, radius_mm: float, noise_mm: float = 0.0) -> SphereFit:
+    """Return the sphere of known radius through points `(m, 3)`, with its uncertainty, by least squares.
 
     Points in one plane, as of a single profile, fit two spheres, one on each side of their plane; they are refused.
-
-    Raises:
-        CalibrationError: There are fewer than 4 points, or two centers fit equally well.
-    """
-    return fit_sphere(points, radius_mm).centre
-
-
-def fit_sphere(points: FloatArray, radius_mm: float, noise_mm: float = 0.0) -> SphereFit:
-    """Return the sphere of known radius through points `(m, 3)`, with its uncertainty; see `sphere_centre`.
 
     Args:
         points: In mm.
         radius_mm: The sphere's radius.
         noise_mm: Standard deviation of the points' heights.
+
+    Raises:
+        CalibrationError: There are fewer than 4 points, or two centers fit equally well.
     """
     if len(points) < _FEWEST_POINTS or not np.isfinite(points).all():
-        raise CalibrationError(f"a sphere's centre needs at least {_FEWEST_POINTS} points, all of them finite")
+        raise CalibrationError(f"a sphere's center needs at least {_FEWEST_POINTS} points, all of them finite")
 
     if not 0.0 < radius_mm < np.inf:
         raise CalibrationError(f"the sphere's radius is {radius_mm:g} mm; it must be a finite number above 0")
 
-    def heights(centre: FloatArray) -> FloatArray:
-        return np.asarray(np.linalg.norm(points - centre, axis=1) - radius_mm)
+    def heights(center: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.norm(points - center, axis=1) - radius_mm)
 
     # |p|^2 = 2 p.c + (r^2 - |c|^2) is linear and gives the start.
     middle = points.mean(axis=0)
@@ -73,9 +67,9 @@ def fit_sphere(points: FloatArray, radius_mm: float, noise_mm: float = 0.0) -> S
         ends[1].cost <= _RIVAL_RATIO**2 * ends[0].cost + 1e-12 * len(points)
         and np.linalg.norm(one - other) > 0.01 * radius_mm
     ):
-        a, b = (", ".join(f"{value:.2f}" for value in centre) for centre in (one, other))
+        a, b = (", ".join(f"{value:.2f}" for value in center) for center in (one, other))
         raise CalibrationError(
-            f"the points of the sphere lie in one plane; centres at ({a}) and ({b}) mm fit equally well:"
+            f"the points of the sphere lie in one plane; centers at ({a}) and ({b}) mm fit equally well:"
             " take profiles from another place as well"
         )
     jacobian = np.asarray(ends[0].jac)

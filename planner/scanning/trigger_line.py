@@ -14,7 +14,7 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from protocol import Clock
-from protocol.bench import InsideView, SimulatedBench, TableStatus
+from protocol.bench import GroundTruth, SimulatedBench, TableStatus
 
 
 class TriggerFaults(NamedTuple):
@@ -52,7 +52,7 @@ class TableTruth(NamedTuple):
     latched_deg: FloatArray
 
 
-class TriggerLine(InsideView, Protocol):
+class TriggerLine(GroundTruth, Protocol):
     """What a motion under way sees of the probe: a `trigger` to pull, and a look at the table."""
 
     def times_s(self) -> FloatArray:
@@ -176,7 +176,7 @@ class ProbeOnPort:
 class ProbeByHand:
     """A probe that the host fires: an emulator that runs in real time, through a view into it."""
 
-    def __init__(self, view: InsideView, clock: Clock) -> None:
+    def __init__(self, view: GroundTruth, clock: Clock) -> None:
         """Take over a view, and the clock of the table's port."""
         self._view, self._clock = view, clock
         self._fired_s: list[float] = []

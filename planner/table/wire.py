@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from planner.errors import PlannerError
 from planner.table.motion import Limits
-from planner.table.velocity_profile import MotionCommand
 from protocol import Command, Ok, Verb, encode_command, encode_reply
+from protocol.trapezoid import MotionCommand
 
 
 class StreamError(PlannerError):

@@ -9,13 +9,13 @@ from protocol.bench import BenchError
 from protocol.command_line import Parser, program_name
 from protocol.conformance.bench.ports import SessionError, open_port
 from protocol.conformance.cases.case import Case
-from protocol.conformance.cases.catalogue import chosen_cases
-from protocol.conformance.commands.command_line import UsageError, say, tell
+from protocol.conformance.cases.catalog import chosen_cases
+from protocol.conformance.commands.command_line import UsageError, tell
 from protocol.conformance.commands.replay_run import run_replay
 from protocol.conformance.commands.suite_run import run_suite
 from protocol.conformance.profile.profile import ProfileError, load_profile
 from protocol.conformance.results.record import RecordError
-from protocol.interrupts import ended_by_signals, status_after
+from protocol.ending import ended
 
 _EXAMPLE = """examples:
   python -m protocol.conformance --port emulator:// --out build/conformance
@@ -28,19 +28,14 @@ Exit status: 0 when no case failed, 1 when one did, 2 when the table could not b
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
-    try:
-        options = parser().read(arguments)
-        cases = _chosen(options.case)
-        if options.list:
-            return _list(cases)
-        with ended_by_signals():
-            return _on_the_table(options, cases)
-    except (UsageError, ProfileError, RecordError, SessionError, BenchError, OSError) as error:
-        say(str(error))
-        return 2
-    except KeyboardInterrupt as interrupt:
-        say("interrupted")
-        return status_after(interrupt)
+    options = parser().read(arguments)
+    expected = UsageError, ProfileError, RecordError, SessionError, BenchError
+    return ended("conformance", lambda: _run(options), *expected)
+
+
+def _run(options: argparse.Namespace) -> int:
+    cases = _chosen(options.case)
+    return _list(cases) if options.list else _on_the_table(options, cases)
 
 
 def _on_the_table(options: argparse.Namespace, cases: Sequence[Case]) -> int:

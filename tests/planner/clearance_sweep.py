@@ -16,9 +16,9 @@ import trimesh
 
 from planner.arrays import FloatArray
 from planner.cell.bodies import FLANGE_FRAME
-from planner.cell.clearance import clearances
 from planner.cell.collision_model import collision_model
 from planner.cell.obstacles import workpiece_obstacle
+from planner.cell.pose_clearance import clearances
 from planner.cell.scan import Scan, load_scan
 from planner.geometry.mesh import sound_mesh
 from planner.geometry.signed_distance_field import build_field

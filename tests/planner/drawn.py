@@ -21,7 +21,7 @@ class Drawn:
         figure.savefig(file, format="png", dpi="figure")
         self._pixels = np.asarray(imread(BytesIO(file.getvalue())), dtype=np.float64)[:, :, :3]
 
-    def colour(self, axes: Axes, x: float, y: float) -> FloatArray:
+    def color(self, axes: Axes, x: float, y: float) -> FloatArray:
         """Return the color `(3,)` at a place in the units of the axes."""
         column, above = axes.transData.transform((x, y))
         return np.asarray(self._pixels[len(self._pixels) - 1 - int(above), int(column)])

@@ -7,16 +7,16 @@ import trimesh
 from planner.arrays import FloatArray, IndexArray
 
 
-def tube(centre: FloatArray, radius_mm: float, sides: int) -> trimesh.Trimesh:
+def tube(center: FloatArray, radius_mm: float, sides: int) -> trimesh.Trimesh:
     """A round tube about a closed curve `(n, 3)`."""
-    ahead = np.roll(centre, -1, axis=0) - np.roll(centre, 1, axis=0)
+    ahead = np.roll(center, -1, axis=0) - np.roll(center, 1, axis=0)
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     across = np.cross(ahead, (0.0, 0.0, 1.0))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     up = np.cross(across, ahead)
     turn = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)[:, np.newaxis, np.newaxis]
-    rings = centre + radius_mm * (np.cos(turn) * across + np.sin(turn) * up)
-    n = len(centre)
+    rings = center + radius_mm * (np.cos(turn) * across + np.sin(turn) * up)
+    n = len(center)
     i, j = (index.ravel() for index in np.meshgrid(np.arange(sides), np.arange(n), indexing="ij"))
     a, b = i * n + j, i * n + (j + 1) % n
     c, d = (i + 1) % sides * n + (j + 1) % n, (i + 1) % sides * n + j

@@ -45,7 +45,7 @@ def short_run_input() -> RunInput:
     problem = short_problem()
     plan = dynamic_programming(problem)
     assert isinstance(plan, Plan)
-    return RunInput("short", plan, problem, np.zeros((LOCATIONS, 6)), {})
+    return RunInput("short", plan, problem, np.zeros((LOCATIONS, 6)), CELL.arm)
 
 
 def paused_run_input() -> RunInput:
@@ -56,7 +56,7 @@ def paused_run_input() -> RunInput:
     angles[10:], speeds[10:] = angles[9] + 50.3, 0.0
     accelerations[10:] = 0.0
     plan = make_plan(problem, "by hand", angles, speeds, accelerations, [Pause(9, float(angles[9]), float(angles[10]))])
-    return RunInput("paused", plan, problem, np.zeros((LOCATIONS, 6)), {})
+    return RunInput("paused", plan, problem, np.zeros((LOCATIONS, 6)), CELL.arm)
 
 
 def document_of(run_input: RunInput) -> dict[str, Any]:

@@ -68,7 +68,7 @@ def large(poses):
     return np.full(len(poses.joints), 2.0)
 
 def raising(poses):
-    raise KeyError("colour")
+    raise KeyError("color")
 """
 PLANNERS = {
     "mine": "own_things:good",
@@ -208,7 +208,7 @@ def test_a_factor_of_another_package_counts_in_the_map_when_the_scan_names_it(tm
     [
         ('["scalar"]', "factor 'scalar': returned an array of shape (); it must be ("),
         ('["large"]', "factor 'large': returned a value outside 0 to 1"),
-        ('["raising"]', "factor 'raising': failed: KeyError: 'colour'"),
+        ('["raising"]', "factor 'raising': failed: KeyError: 'color'"),
         ('["number"]', "factor 'number': is not a function"),
         (
             '["haf"]',

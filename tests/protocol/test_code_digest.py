@@ -4,8 +4,11 @@ import importlib
 import math
 import sys
 from collections.abc import Callable, Iterator
+from enum import IntEnum
 from pathlib import Path
+from typing import NamedTuple
 
+import numba
 import numpy as np
 import pytest
 
@@ -58,7 +61,9 @@ def digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
 
     def read(file: str = "whole.py", old: str = "", new: str = "") -> str:
-        sources = {"sizes.py": SIZES, "parts.py": PARTS, "whole.py": WHOLE}
+        sources = {
+            "sizes.py": SIZES, "boxes.py": SIZES, "parts.py": PARTS, "growth.py": PARTS, "whole.py": WHOLE,
+        }  # fmt: skip
         assert sources[file].count(old) >= 1, old
         sources[file] = sources[file].replace(old, new, 1)
         for name, text in sources.items():
@@ -68,7 +73,7 @@ def digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
         return code_digest(importlib.import_module("whole").outer)
 
     yield read
-    for name in ("sizes", "parts", "whole"):
+    for name in ("sizes", "boxes", "parts", "growth", "whole"):
         sys.modules.pop(name, None)
 
 
@@ -109,6 +114,8 @@ def test_what_is_not_code_that_runs_does_not_count(digest: Callable[..., str], f
         ("parts.py", "x + by", "x - by"),
         ("parts.py", "by=1.0", "by=1"),
         ("parts.py", "more=0", "more=1"),
+        ("whole.py", "from sizes import Box, Kind", "from sizes import Kind\nfrom boxes import Box"),
+        ("whole.py", "from parts import FACTOR, grown", "from parts import FACTOR\nfrom growth import grown"),
         ("sizes.py", "FLAT = 2", "FLAT = 3"),
         ("sizes.py", "width: float = 2.0", "width: float = 2.5"),
         ("sizes.py", "length: float\n    width: float = 2.0", "width: float\n    length: float = 2.0"),
@@ -123,6 +130,17 @@ def test_what_a_function_computes_counts_in_all_files(
     assert digest(file, old, new) != digest()
 
 
+def test_a_function_that_reads_a_variable_without_value_has_none() -> None:
+    value = 1
+
+    def reader() -> int:
+        return value  # noqa: F821  # that is the test
+
+    del value
+    with pytest.raises(NoDigestError):
+        code_digest(reader)
+
+
 def test_functions_that_call_each_other_have_a_digest() -> None:
     def even(n: int) -> bool:
         return n == 0 or odd(n - 1)
@@ -132,6 +150,31 @@ def test_functions_that_call_each_other_have_a_digest() -> None:
 
     assert code_digest(even) != code_digest(odd)
     assert code_digest(even) == code_digest(even)
+
+
+class Sign(IntEnum):
+    PLUS = 1
+
+
+class OtherSign(IntEnum):
+    PLUS = 1
+
+
+def math_of(x: float) -> float:
+    return x + 1.0
+
+
+def holding_itself() -> list[object]:
+    result: list[object] = []
+    result.append(result)
+    return result
+
+
+def of_a_local_class() -> object:
+    class Local(NamedTuple):
+        x: float
+
+    return Local(1.0)
 
 
 def closure_over(value: object) -> Callable[[], object]:
@@ -152,6 +195,8 @@ def closure_over(value: object) -> Callable[[], object]:
         (np.float32(1.0), np.float64(1.0)),
         (math.sin, math.cos),
         (np.sin, np.cos),
+        (Sign.PLUS, OtherSign.PLUS),
+        (numba.njit(math_of), numba.njit(fastmath=True)(math_of)),
     ],
 )
 def test_values_that_differ_have_digests_that_differ(one: object, other: object) -> None:
@@ -159,7 +204,22 @@ def test_values_that_differ_have_digests_that_differ(one: object, other: object)
     assert code_digest(one) != code_digest(other)
 
 
-@pytest.mark.parametrize("value", [object(), sys.stdout, {"a": 1}, Path(), NoDigestError])
+@pytest.mark.parametrize(
+    "value",
+    [
+        object(),
+        sys.stdout,
+        {"a": 1},
+        Path(),
+        NoDigestError,
+        np.array([{}]),
+        numba.int32,
+        np.random.normal,
+        np.vectorize(math_of),
+        holding_itself(),
+        of_a_local_class(),
+    ],
+)
 def test_a_function_that_reads_something_else_has_none(value: object) -> None:
     with pytest.raises(NoDigestError):
         code_digest(closure_over(value))

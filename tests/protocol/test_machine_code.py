@@ -1,17 +1,15 @@
 """Machine code is kept under what it is: a small package is edited, and each run says how much was compiled."""
 
-import errno
 import os
+import pickle
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
-from protocol import kept_code
-from protocol.kept_code import UNUSED_DAYS, code_folder, keep_code, load_code
+from protocol import kept_file
 
 ROOT = Path(__file__).parents[2]
 
@@ -89,6 +87,38 @@ def checkout(tmp_path: Path) -> Checkout:
     return Checkout(tmp_path / "one", tmp_path / "cache")
 
 
+FACTORY = """
+from planner.kernel import kernel
+
+def scaled_by(factor):
+    @kernel
+    def part(number):
+        return factor * number if number < 9.0 else part(number - 1.0)
+
+    @kernel
+    def scaled(number):
+        return part(number)
+
+    return scaled
+"""
+
+
+def scaled_in_another_process(folder: Path, *factors: float) -> list[float]:
+    """Return what functions of one name and type give that were made, and compiled or loaded, in a new process."""
+    (folder / "factory.py").write_text(FACTORY)
+    program = f"from factory import scaled_by; print(*[scaled_by(factor)(1.0) for factor in {factors}])"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(folder / "cache")}
+    run = [sys.executable, "-B", "-c", program]
+    output = subprocess.run(run, cwd=folder, env=environment, capture_output=True, text=True, check=True).stdout
+    return [float(number) for number in output.split()]
+
+
+def test_code_of_two_processes_is_not_mixed_up_in_a_third(tmp_path: Path) -> None:
+    assert scaled_in_another_process(tmp_path, 2.0) == [2.0]
+    assert scaled_in_another_process(tmp_path, 3.0) == [3.0]
+    assert scaled_in_another_process(tmp_path, 4.0, 2.0, 3.0) == [4.0, 2.0, 3.0]
+
+
 def kept_files(checkout: Checkout) -> list[Path]:
     return [file for file in checkout.cache.rglob("*") if file.is_file()]
 
@@ -119,6 +149,24 @@ def test_a_damaged_file_is_replaced(checkout: Checkout) -> None:
     assert checkout.run() == (13.0, 0)
 
 
+def test_whole_files_of_something_else_are_replaced(checkout: Checkout) -> None:
+    assert checkout.run() == (13.0, 2)
+    [file] = kept_files(checkout)
+    for content in (b"no pickle", pickle.dumps(()), pickle.dumps((None,) * 9)):
+        seal = kept_file._seal(file.name, content)  # noqa: SLF001  # what an older version may have written
+        file.write_bytes(seal + content)
+        assert checkout.run() == (13.0, 2)
+    assert checkout.run() == (13.0, 0)
+
+
+def test_code_is_compiled_for_the_settings_of_numba(checkout: Checkout, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert checkout.run() == (13.0, 2)
+    monkeypatch.setenv("NUMBA_LOOP_VECTORIZE", "0")
+    assert checkout.run() == (13.0, 2)
+    monkeypatch.setenv("NUMBA_NUM_THREADS", "1")
+    assert checkout.run() == (13.0, 0)
+
+
 def test_without_a_folder_that_can_be_written_code_is_compiled_each_time(checkout: Checkout) -> None:
     checkout.cache.write_text("a file in the place of the folder")
     assert checkout.run() == (13.0, 2)
@@ -130,56 +178,6 @@ def test_processes_that_compile_at_once_leave_one_whole_file(checkout: Checkout)
     assert {result_of(process)[0] for process in processes} == {13.0}
     assert len(kept_files(checkout)) == 1
     assert checkout.run() == (13.0, 0)
-
-
-@pytest.fixture
-def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    kept_code.prune.cache_clear()
-
-
-@pytest.mark.usefixtures("_own_cache")
-def test_what_was_kept_is_loaded_and_nothing_else(tmp_path: Path) -> None:
-    assert code_folder().is_relative_to(tmp_path)
-    keep_code("a", b"machine code")
-    assert load_code("a") == b"machine code"
-    assert load_code("b") is None
-    [file] = code_folder().iterdir()
-    content = bytearray(file.read_bytes())
-    content[-1] ^= 1
-    file.write_bytes(content)
-    assert load_code("a") is None
-
-
-@pytest.mark.usefixtures("_own_cache")
-def test_a_full_disk_costs_nothing_but_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(_file: Path, _content: bytes) -> int:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    keep_code("a", b"machine code")
-    assert load_code("a") is None
-    assert list(code_folder().iterdir()) == []
-
-
-@pytest.mark.usefixtures("_own_cache")
-def test_code_that_no_run_has_used_for_long_is_deleted(tmp_path: Path) -> None:
-    long_ago = time.time() - (UNUSED_DAYS + 1) * 86_400
-    old_layout = tmp_path / "seventh-axis" / "0123456789abcdef" / "geometry_0"
-    old_layout.mkdir(parents=True)
-    foreign = tmp_path / "other" / "their.nbc"
-    foreign.parent.mkdir()
-    for name in ("used", "unused"):
-        keep_code(name, b"code")
-    for file in (*code_folder().iterdir(), old_layout / "old.nbc", old_layout / "old.nbi", foreign):
-        file.touch()
-        os.utime(file, (long_ago, long_ago))
-    assert load_code("used") == b"code"
-    kept_code.prune.cache_clear()
-    keep_code("new", b"code")
-    assert {file.stem for file in code_folder().iterdir()} == {"used", "new"}
-    assert list(old_layout.iterdir()) == []
-    assert foreign.exists()
 
 
 LISTING = """
@@ -220,5 +218,5 @@ def test_every_kernel_of_the_planner_is_kept_whatever_is_said_about_it(tmp_path:
     after = names_of_kernels(tmp_path)
     changed = {name for name in before if before[name] != after[name]}
     assert "planner.geometry.capsule segment_distance" in changed
-    assert "planner.map.map_builder _rate_columns" in changed
+    assert "planner.map.map_builder rate_columns" in changed
     assert not [name for name in changed if "planner.planning" in name or "planner.table" in name]

@@ -36,7 +36,7 @@ def test_the_refusals_are_those_of_the_code() -> None:
 
 
 def test_the_cost_of_a_decimal_is_what_geometry_says() -> None:
-    rows = re.findall(r"^\| (\d) \| (\S+) deg \| (\S+) micrometres \| (\S+) mm \|", SPECIFICATION, re.MULTILINE)
+    rows = re.findall(r"^\| (\d) \| (\S+) deg \| (\S+) micrometers \| (\S+) mm \|", SPECIFICATION, re.MULTILINE)
     assert [int(decimals) for decimals, *_ in rows] == [1, 2, 3]
     for decimals, error_deg, arc_um, radius_mm in rows:
         arc_um_per_mm = 1000 * math.radians(0.5 * 10 ** -int(decimals))

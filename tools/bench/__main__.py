@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 
 from protocol.command_line import Parser, program_name
-from tools.command_line import ended
+from protocol.ending import ended
 
 SUBJECTS = ("calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream")
 

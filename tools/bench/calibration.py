@@ -18,7 +18,7 @@ from tools.bench.timing import print_table
 
 SEEDS = 50
 _TRUE = Calibration.of(Cell())
-_CENTRE_B = np.array([690.0, 0.0, 180.0])
+_CENTER_B = np.array([690.0, 0.0, 180.0])
 _NOMINAL_OFF = placement(1.0, -1.5, 0.0, 0.0, 0.0, 0.0) @ placement(0.0, 0.0, 0.0, 30.0, 0.5, -30.0)
 
 
@@ -60,11 +60,11 @@ class ProbeTrial(NamedTuple):
         T_FS = _TRUE.T_FS @ placement(*rng.uniform(-20.0, 20.0, 6))
         sweep_mm = np.linspace(-0.6, 0.6, self.profiles) * self.true_radius_mm
         steps = np.stack([placement(0.0, y, 0.0, 0.0, 0.0, 0.0) for y in sweep_mm])
-        poses = (views_of(_CENTRE_B, self.views, probe)[:, np.newaxis] @ steps).reshape(-1, 4, 4)
-        centres = _CENTRE_B + self._shares(len(poses))[:, np.newaxis] * self.moved_mm * _direction(rng)
+        poses = (views_of(_CENTER_B, self.views, probe)[:, np.newaxis] @ steps).reshape(-1, 4, 4)
+        centers = _CENTER_B + self._shares(len(poses))[:, np.newaxis] * self.moved_mm * _direction(rng)
         points = [
-            profile_of_sphere(probe, T, centre, self.true_radius_mm, rng)
-            for T, centre in zip(poses, centres, strict=True)
+            profile_of_sphere(probe, T, center, self.true_radius_mm, rng)
+            for T, center in zip(poses, centers, strict=True)
         ]
         try:
             found = calibrate_probe(
@@ -111,10 +111,10 @@ class AxisTrial(NamedTuple):
         T_BT = _TRUE.T_BT @ placement(*rng.uniform(-20.0, 20.0, 2), 0.0, 30.0, rng.uniform(0.0, 3.0), -30.0)
         seats = np.tile((120.0, 0.0, 60.0, 1.0), (len(angles), 1))
         seats[len(angles) // 2 :, :3] += self.moved_mm * _direction(rng)
-        centres = np.einsum("nij,nj->ni", T_BT @ rotations_z(angles), seats)[:, :3]
-        centres += rng.normal(0.0, self.noise_mm, centres.shape)
+        centers = np.einsum("nij,nj->ni", T_BT @ rotations_z(angles), seats)[:, :3]
+        centers += rng.normal(0.0, self.noise_mm, centers.shape)
         try:
-            found = calibrate_table_axis(centres, angles, _TRUE.T_BT)
+            found = calibrate_table_axis(centers, angles, _TRUE.T_BT)
         except CalibrationError:
             return Outcome(True)
         off = rigid_inverse(T_BT) @ found.T_BT

@@ -100,11 +100,6 @@ def random_plant(seed: int) -> Constants:
     return plant
 
 
-def write_plant(folder: Path, seed: int) -> Path:
-    """Write the configuration of a random table, and return its path."""
-    return write_constants(folder / f"{seed}.toml", random_plant(seed))
-
-
 def write_constants(path: Path, constants: Constants) -> Path:
     """Write a configuration, and return its path."""
     path.write_text("".join(f"{name} = {value!r}\n" for name, value in constants.items()), encoding="utf-8")

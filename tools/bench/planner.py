@@ -35,8 +35,6 @@ from planner.table.motion import Limits
 from tools.bench.default_planner import bench_default_planner, lattice_optimum
 from tools.bench.planner_families import FAMILIES
 
-GROWING_MAPS = ((100, 100), (200, 100), (400, 100), (100, 200), (100, 400), (1000, 100), (400, 360), (1200, 1440))
-
 # All planners are compared on the first families, on which ray shooting gets along.
 COMPARED_FAMILIES = 11
 

@@ -94,7 +94,7 @@ def _bench_whole_scans(stream: TextIO) -> None:
         told = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout
         profiles, points, seconds, before_mb, after_mb = told.split()
         rows.append((f"{rate_hz:g}/s", profiles, points, seconds, before_mb, after_mb))
-    title = "A whole scan of a part of 100 mm: plan, motion, profiles, account"
+    title = "A whole scan of a part of 100 mm: plan, motion, profiles, error budget"
     print_table(stream, title, ("rate", "profiles", "points", "s", "MB imported", "MB at most"), rows)
 
 

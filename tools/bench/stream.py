@@ -16,8 +16,8 @@ from planner.execution.table_motion import TableMotion
 from planner.planning.plan import Plan
 from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
-from planner.table.velocity_profile import way_to_rest_deg
 from planner.table.wire import Wire
+from protocol.trapezoid import way_to_rest_deg
 from tools.bench.timing import print_table
 from tools.bench.virtual_run import VirtualRun, random_run_inputs, run_in_virtual_time, shipped_run_input
 
@@ -83,13 +83,6 @@ def random_plan(generator: np.random.Generator, step_s: float, duration_s: float
     return Plan("random", "", step_s, angles, speeds, accelerations, PathCost(0.0, 0.0, 0.0))
 
 
-def errors_at_locations(plan: Plan, limits: Limits, streamed: Callable[..., Sequence[TimedCommand]]) -> FloatArray:
-    """Return how far the reference is from a plan at each location, by the controller's own rules."""
-    motion = TableMotion(plan, limits)
-    states = reference_states(streamed(motion, limits, Wire()), motion.column_times_s)
-    return np.array([state.angle_deg for state in states]) - plan.angles_deg
-
-
 def stream_figures(motion: TableMotion, commands: Sequence[TimedCommand]) -> StreamFigures:
     """Return the greatest deviations of a stream, from the first location to the last, and its longest run-on."""
 
@@ -115,7 +108,7 @@ def _bench_rounding(out: TextIO) -> None:
     rows = []
     for scan in shipped_scans():
         run_input = shipped_run_input(scan)
-        motion, limits = TableMotion(run_input.plan, run_input.problem.limits), run_input.problem.limits
+        motion, limits = run_input.motion(), run_input.problem.limits
         rows += [_figures_of(f"{scan}, {name}", [motion], limits, streamed) for name, streamed in STREAMS.items()]
         rows.append((f"{scan}, run-on not bounded, S and A only", *(f"{value:g}" for value in UNBOUNDED[scan])))
     print_table(out, "The same for the shipped scans", _STREAM_HEADER, rows)

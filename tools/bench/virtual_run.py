@@ -14,6 +14,7 @@ from planner.execution.run_record import Record
 from planner.execution.run_verification import RunVerification, verify_run
 from planner.execution.table_motion import TableMotion
 from planner.execution.table_port import open_port
+from planner.kinematics.arm import Arm
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
 from planner.map.map_builder import build_maps
@@ -99,4 +100,8 @@ def widened(configuration_map: ConfigurationMap, samples: int) -> ConfigurationM
 def _run_input(name: str, asked: Problem, problem: Problem) -> RunInput | None:
     """Return the plan of the problem `asked`, to be judged by `problem`; None where there is no plan."""
     plan = dynamic_programming(asked)
-    return RunInput(name, plan, problem, np.zeros((len(plan.angles_deg), 6)), {}) if isinstance(plan, Plan) else None
+    return (
+        RunInput(name, plan, problem, np.zeros((len(plan.angles_deg), 6)), Arm.load())
+        if isinstance(plan, Plan)
+        else None
+    )

@@ -1,9 +1,9 @@
 """How far a table is behind its reference, told from its readings while it is being recorded.
 
 A reading is rounded, mostly to a tenth of a degree. It tells most when the table is about to pass from one rounded
-value to the next, so the recorder wants to foretell that. The lag is taken to be linear in speed, direction and
+value to the next, so the recorder wants to predict that. The lag is taken to be linear in speed, direction and
 acceleration; each reading tells an interval in which it was. That is a Kalman filter whose measurements are intervals:
-the foretold normal distribution, cut to the interval, is replaced by a normal one of the same mean and variance.
+the predicted normal distribution, cut to the interval, is replaced by a normal one of the same mean and variance.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from tools.identification.excitation import Reference
 
 _MEAN = (3.5e-3, 0.05, 8e-5, 5e-5)
 _DEVIATION = (3e-3, 0.03, 1e-4, 1e-4)
-_UNFORETOLD_DEG = 0.006
+_UNPREDICTED_DEG = 0.006
 _FORGETTING, _SURPRISED = 1.001, 1.1
 _SURPRISE = 1e-3
 _WIDEST = 30.0
@@ -42,9 +42,9 @@ class LagTracker:
             return
         features = _features(reference)
         spread = self._covariance @ features
-        variance = float(features @ spread) + _UNFORETOLD_DEG**2
-        deviation, foretold = sqrt(variance), float(features @ self._mean)
-        low, high = (low_deg - foretold) / deviation, (high_deg - foretold) / deviation
+        variance = float(features @ spread) + _UNPREDICTED_DEG**2
+        deviation, predicted = sqrt(variance), float(features @ self._mean)
+        low, high = (low_deg - predicted) / deviation, (high_deg - predicted) / deviation
         probability = _normal(high) - _normal(low)
         self._forget(_FORGETTING if probability >= _SURPRISE else _SURPRISED)
         if probability < _SURPRISE:

@@ -1,4 +1,4 @@
-"""Which keys the planner's readers ask of a TOML file, with what they allow: the readers run, and are recorded."""
+"""Which keys readers ask of a TOML file, with what they allow: the readers run, and are recorded."""
 
 import inspect
 import json
@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from planner.errors import ScanFileError
-from planner.toml_table import TomlTable
+from protocol.data_file import DataFileError
+from protocol.toml_table import TomlTable
 from tools.reference.keys import Key
 
-READERS = ("number", "count", "numbers", "text", "texts", "choice")
+READERS = ("number", "count", "switch", "numbers", "text", "texts", "choice")
 """The methods of `TomlTable` that return a value."""
 
 
-def recorded_keys(read: Callable[[], object]) -> dict[tuple[Path, str], Key]:
+def recorded_keys(read: Callable[[], object]) -> dict[tuple[Path | str, str], Key]:
     """Return the keys that `read` asks for, by file and name; indices such as `joint[1]` are left out of names."""
-    found: dict[tuple[Path, str], Key] = {}
+    found: dict[tuple[Path | str, str], Key] = {}
     with ExitStack() as stack:
         for name in READERS:
             stack.enter_context(patch.object(TomlTable, name, _recording(getattr(TomlTable, name), found)))
@@ -27,7 +27,7 @@ def recorded_keys(read: Callable[[], object]) -> dict[tuple[Path, str], Key]:
     return found
 
 
-def _recording(reader: Callable[..., Any], found: dict[tuple[Path, str], Key]) -> Callable[..., Any]:
+def _recording(reader: Callable[..., Any], found: dict[tuple[Path | str, str], Key]) -> Callable[..., Any]:
     def recording(table: TomlTable, key: str, *arguments: object, **options: object) -> object:
         name = re.sub(r"\[\d+\]", "", table.name_of(key))
         bound = inspect.signature(reader).bind(table, key, *arguments, **options).arguments
@@ -44,7 +44,7 @@ def _allowed(reader: Callable[..., Any], key: str, arguments: tuple[object, ...]
     """Return what the reader's own refusal says; no key may be a table."""
     try:
         reader(TomlTable(Path("probe"), {key: {}}), key, *arguments, **options)
-    except ScanFileError as error:
+    except DataFileError as error:
         return str(error).partition("; it must be ")[2]
     raise AssertionError(f"a table as the value of {key} is accepted")
 

@@ -1,14 +1,11 @@
 """The keys of a table's configuration file and of its faults, from the sections that read them."""
 
-from collections.abc import Iterator
-from dataclasses import Field, fields, is_dataclass
-from typing import Any, get_type_hints
-
 from emulator.config.table_config import DEFAULT_FILE, load_config
 from emulator.faults.fault import KINDS, help_of, parameters_of
 from emulator.faults.parameter import Parameter
 from tools.reference.keys import Key, comments, key_page
 from tools.reference.markdown import code, table
+from tools.reference.recorded_keys import recorded_keys
 
 _INTRODUCTION = """A file for `python -m emulator --config` and for `emulator://?config=`. It needs only the keys
 that
@@ -22,31 +19,8 @@ def table_page() -> str:
 
 def table_keys() -> list[Key]:
     """Return the keys of every section."""
-    return list(_keys(load_config(), "", comments(DEFAULT_FILE.read_text(encoding="utf-8"))))
-
-
-def _keys(section: Any, where: str, notes: dict[str, str]) -> Iterator[Key]:  # noqa: ANN401  # a section of any kind
-    types = get_type_hints(type(section))
-    for entry in fields(section):
-        name, value = where + entry.name, getattr(section, entry.name)
-        if is_dataclass(value):
-            yield from _keys(value, f"{name}.", notes)
-        elif not isinstance(value, tuple):  # the faults
-            default = str(value).lower() if isinstance(value, bool) else f"{value:g}" if value < 1e5 else str(value)
-            yield Key(name, _allowed(types[entry.name], entry), default, notes.get(name, ""))
-
-
-def _allowed(kind: type, entry: "Field[Any]") -> str:
-    if kind is bool:
-        return "true or false"
-    limits = entry.metadata
-    bounds = [
-        f"{words} {limits[key]:.10g}"
-        for key, words in (("above", "above"), ("least", "at least"), ("most", "at most"))
-        if limits[key] is not None
-    ]
-    what = "whole number" if kind is int else 'number, or a fraction such as "7/3"' if limits["fraction"] else "number"
-    return f"{what}, {' and '.join(bounds)}"
+    notes = comments(DEFAULT_FILE.read_text(encoding="utf-8"))
+    return [key._replace(notes=notes.get(key.name, "")) for key in recorded_keys(load_config).values()]
 
 
 def _faults() -> str:

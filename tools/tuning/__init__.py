@@ -8,7 +8,7 @@ from tools.tuning.bounds import Limits
 from tools.tuning.check import Check, Curve, Figure
 from tools.tuning.checks import EmulatorChecks, check_on_emulator
 from tools.tuning.gain_files import gains_config
-from tools.tuning.linear_model import Teeth, plant, quantisation_noise
+from tools.tuning.linear_model import Teeth, plant, quantization_noise
 from tools.tuning.loop import closed_loop, open_loop, registers, regulator
 from tools.tuning.loop_figures import LoopFigures
 
@@ -26,7 +26,7 @@ __all__ = [
     "gains_config",
     "open_loop",
     "plant",
-    "quantisation_noise",
+    "quantization_noise",
     "registers",
     "regulator",
 ]

@@ -1,4 +1,4 @@
-"""A check on the emulator: what a run shows, beside what the linear model foretells, and the motions that all share."""
+"""A check on the emulator: what a run shows, beside what the linear model predicts, and the motions that all share."""
 
 from typing import NamedTuple
 

@@ -13,7 +13,7 @@ from tools.tuning.noise_check import noise
 from tools.tuning.nonlinear_checks import creep, reversal, small_moves
 
 AGREES_SHARE = 0.2
-"""Beyond this share of what the model foretells, a difference is explained."""
+"""Beyond this share of what the model predicts, a difference is explained."""
 
 _CHECKS: tuple[Callable[[TableConfig, int], Check], ...] = (
     ramp,
@@ -66,7 +66,7 @@ def all_checks(config: TableConfig, seed: int) -> list[Check]:
 
 
 def differs(figure: Figure) -> bool:
-    """Return whether the emulator is not where the model foretells it."""
+    """Return whether the emulator is not where the model predicts it."""
     return figure.model is not None and abs(figure.emulator - figure.model) > AGREES_SHARE * abs(figure.model)
 
 

@@ -4,8 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from emulator.config.table_config import GainSetsConfig, TableConfig, load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, GainSetsConfig, TableConfig, load_config
 from protocol.data_file import read_toml
 
 

@@ -1,4 +1,4 @@
-"""Checks that the linear model foretells: a ramp, a step of the reference, a step of the load."""
+"""Checks that the linear model predicts: a ramp, a step of the reference, a step of the load."""
 
 from collections.abc import Callable
 
@@ -33,7 +33,7 @@ def ramp(config: TableConfig, seed: int) -> Check:
     moving = (answer.time_s > start_s).astype(float)
     outputs = _ramp_then_hold(config, answer.time_s, reference, moving_friction_Nm(config) * moving)
     error = reference - answer.measured_deg_s
-    foretold = None if outputs is None else reference - outputs[1]
+    predicted = None if outputs is None else reference - outputs[1]
     late = (answer.time_s > start_s + 0.5 * ramp_s) & (answer.time_s <= start_s + ramp_s)
     steady = answer.time_s > start_s + ramp_s + 0.3
     lag = answer.reference_deg - answer.encoder_deg
@@ -42,13 +42,13 @@ def ramp(config: TableConfig, seed: int) -> Check:
         "ramp",
         "ramp",
         "speed error (deg/s)",
-        Curve(answer.time_s, error, foretold),
+        Curve(answer.time_s, error, predicted),
         (
             Figure(
                 "ramp_lag_deg_s",
                 f"speed lag on a ramp of {acceleration:.3g} deg/s2",
                 "deg/s",
-                *_means(error, foretold, late),
+                *_means(error, predicted, late),
             ),
             Figure(
                 "cruise_lag_deg",
@@ -173,13 +173,13 @@ def _linear(loop: control.StateSpace, time_s: Array, reference_deg_s: Array, loa
     return outputs
 
 
-def _means(seen: Array, foretold: Array | None, where: NDArray[np.bool_]) -> tuple[float, float | None]:
-    return _pair(seen, foretold, lambda curve: float(curve[where].mean()))
+def _means(seen: Array, predicted: Array | None, where: NDArray[np.bool_]) -> tuple[float, float | None]:
+    return _pair(seen, predicted, lambda curve: float(curve[where].mean()))
 
 
-def _pair(seen: Array, foretold: Array | None, figure: Callable[[Array], float]) -> tuple[float, float | None]:
+def _pair(seen: Array, predicted: Array | None, figure: Callable[[Array], float]) -> tuple[float, float | None]:
     """Return a figure of the emulator and, where there is one, of the linear answer."""
-    return figure(seen), None if foretold is None else figure(foretold)
+    return figure(seen), None if predicted is None else figure(predicted)
 
 
 def _settling_ms(time_s: Array, deviation: Array, height: float) -> float:

@@ -1,11 +1,11 @@
 """The speed loop as a linear sampled system, from the same configuration that the emulator runs on.
 
-Between two control ticks the duty is held, so motor, gears and load are discretised with a zero-order hold. The
+Between two control ticks the duty is held, so motor, gears and load are discretized with a zero-order hold. The
 loop's timing is the firmware's: the speed is the count's difference over a window of W ticks, and a new duty waits one
 tick in the PWM's buffer before it is on the bridge (`emulator.table.tick`).
 
 What is not linear is left out and stated elsewhere: dry friction acts as a constant load while the table turns, the
-quantization of speed and PWM as two noises (`quantisation_noise`), and the backlash as the states of `Teeth`.
+quantization of speed and PWM as two noises (`quantization_noise`), and the backlash as the states of `Teeth`.
 """
 
 from enum import StrEnum
@@ -116,8 +116,8 @@ def speed_quantum_deg_s(config: TableConfig) -> float:
     return 1.0 / config.counts_per_deg * config.control.tick_hz / config.control.speed_window_ticks
 
 
-def quantisation_noise(config: TableConfig) -> tuple[float, float]:
-    """Return the standard deviations of the two quantisations: of a count in deg, of the PWM in duty.
+def quantization_noise(config: TableConfig) -> tuple[float, float]:
+    """Return the standard deviations of the two quantizations: of a count in deg, of the PWM in duty.
 
     Rounding to a step is taken as white noise, uniform over the step: step / sqrt(12).
     """

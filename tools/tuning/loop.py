@@ -14,9 +14,10 @@ import control
 import numpy as np
 
 from emulator.config.constants import fixed_gains
-from emulator.config.table_config import GainsConfig, TableConfig
-from emulator.config.toml_section import section
+from emulator.config.table_config import ConfigError, GainsConfig, TableConfig
 from emulator.firmware.pid import Gains
+from protocol.toml_section import section
+from protocol.toml_table import TomlTable
 from tools.tuning.linear_model import Teeth, duty_gains, held_motor, plant
 
 INTEGRAL_STATE = -2
@@ -33,7 +34,7 @@ def registers(config: TableConfig, gains: GainsConfig) -> Gains:
     Raises:
         ConfigError: A gain is not finite, out of its range, or does not fit its register.
     """
-    return fixed_gains(config, section(GainsConfig, asdict(gains), "gains"))
+    return fixed_gains(config, section(GainsConfig, TomlTable("gains", asdict(gains), error=ConfigError), {}))
 
 
 def regulator(config: TableConfig, gains: GainsConfig | Gains) -> control.StateSpace:

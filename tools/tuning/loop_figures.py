@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from emulator.config.table_config import TableConfig
 from tools.tuning.frequency_response import Array, Complex, PlantResponse, grid_hz, grid_z, plant_response
-from tools.tuning.linear_model import Teeth, duty_gains, quantisation_noise, speed_gain_deg_s
+from tools.tuning.linear_model import Teeth, duty_gains, quantization_noise, speed_gain_deg_s
 from tools.tuning.margins import controller, margins, noise_duty, noise_power
 from tools.tuning.speed_noise import steady_noise
 
@@ -63,7 +63,7 @@ def loop_figures(loops: Loops, registers: Array) -> LoopFigures:
     per_state = [
         margins(regulator.by_measured * plant.measured_by_duty, loops.frequency_hz) for plant in loops.plants.values()
     ]
-    count_deg, _ = quantisation_noise(config)
+    count_deg, _ = quantization_noise(config)
     window_s, count_tick = window_ticks / tick_hz, config.limits.speed_deg_s * config.counts_per_deg / tick_hz
     noises = [noise_duty(regulator, plant, count_deg, window_s, window_ticks, z) for plant in loops.plants.values()]
     steady = [

@@ -51,7 +51,7 @@ def controller(gains: Array, z: Complex) -> Controller:
 def margins(loop: Complex, frequency_hz: Array) -> Margins:
     """Return the margins of loops L of stable plants with an integrating regulator; shape (..., frequencies)."""
     distance = 1.0 + loop
-    # Nyquist: from -90 deg at 0 Hz, on the integrator's account, 1 + L must turn by +90 deg and not about the origin.
+    # Nyquist: from -90 deg at 0 Hz, because of the integrator, 1 + L must turn by +90 deg and not about the origin.
     turned = np.angle(distance[..., 0]) + np.angle(distance[..., 1:] / distance[..., :-1]).sum(axis=-1)
     return Margins(
         np.abs(turned) < np.pi / 2,

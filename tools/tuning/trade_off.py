@@ -3,8 +3,7 @@
 from typing import NamedTuple
 
 from emulator.config.constants import fixed_gains
-from emulator.config.table_config import GainsConfig, TableConfig
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, GainsConfig, TableConfig
 from emulator.firmware.pid import Gains
 from tools.emulated import with_gains
 from tools.tuning.bounds import Limits

@@ -10,7 +10,7 @@ from tools.tuning.check import Figure
 from tools.tuning.checks import differs
 from tools.tuning.comparison_report import textbook_table, trade_table
 from tools.tuning.gain_design import Design
-from tools.tuning.linear_model import duty_gains, quantisation_noise, speed_quantum_deg_s
+from tools.tuning.linear_model import duty_gains, quantization_noise, speed_quantum_deg_s
 from tools.tuning.loop_figures import LoopFigures
 from tools.tuning.tuned_table import JUDGED, TunedSet, Tuning, Words
 from tools.tuning.way_out import changes
@@ -273,7 +273,7 @@ def _spread_table(tuning: Tuning) -> str:
 
 
 def _noise(tuning: Tuning) -> str:
-    count_deg, duty = quantisation_noise(tuning.before)
+    count_deg, duty = quantization_noise(tuning.before)
     return (
         f"The position is rounded to counts, a white noise of {count_deg:.2g} deg (standard "
         "deviation), which the regulator turns into the noise at the PWM on a ramp. At a constant speed the rounding "

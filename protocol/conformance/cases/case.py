@@ -34,7 +34,7 @@ class Case:
 
 
 CASES: dict[str, Case] = {}
-"""Every case by its id, as far as its file has been imported; `catalogue` has them all."""
+"""Every case by its id, as far as its file has been imported; `catalog` has them all."""
 
 
 def case(identifier: str, *needs: str, travel_deg: float = 0.0) -> Callable[[Run], Run]:

@@ -157,7 +157,7 @@ def _unhurried(rig: Rig, distance_deg: float, top_deg_s: float, rate_deg_s2: flo
 def _measure_trapezoid(rig: Rig) -> None:
     """Measure acceleration, top speed and deceleration, each by a line through what must be one."""
     motion = rig.motion.expectations[-1].motion
-    up, cruise, down = motion.phases
+    up, cruise, down = motion.segments
     top, rate = rig.top_deg_s, rig.rate_deg_s2
     speed_share = rig.profile.tolerance.speed_share
     settled_s = up.duration_s + min(0.1, cruise.duration_s / 3)
@@ -166,7 +166,7 @@ def _measure_trapezoid(rig: Rig) -> None:
     rig.measure("top speed", top_measured, "deg/s", top * (1 - speed_share), top * (1 + speed_share))
     share = rig.profile.tolerance.acceleration_share
     for name, origin_deg, begin_s, end_s in (
-        ("acceleration", motion.start_deg, 0.1 * up.duration_s, up.duration_s),
+        ("acceleration", motion.start.angle_deg, 0.1 * up.duration_s, up.duration_s),
         (
             "deceleration",
             motion.target_deg,
@@ -198,7 +198,7 @@ def _measure_duration(rig: Rig) -> None:
 def _time_of(expected: Expectation, position_deg: float) -> float:
     """Return when the reference of a motion from rest is at a position, by bisection."""
     low_s, high_s = 0.0, expected.motion.duration_s
-    forwards = expected.motion.target_deg > expected.motion.start_deg
+    forwards = expected.motion.target_deg > expected.motion.start.angle_deg
     for _ in range(40):
         middle_s = (low_s + high_s) / 2
         if (expected.motion.at(middle_s)[0] < position_deg) == forwards:

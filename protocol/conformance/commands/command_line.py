@@ -1,9 +1,8 @@
 """What the kit's command line says and asks."""
 
-import os
 import sys
-from contextlib import suppress
 
+from protocol import ending
 from protocol.conformance.bench.ports import is_simulated
 from protocol.conformance.bench.wire import ReopenablePort
 from protocol.conformance.profile.profile import Profile
@@ -16,10 +15,7 @@ class UsageError(Exception):
 
 def say(sentence: str) -> None:
     """Tell the person at the terminal, if there is one."""
-    if sys.stderr is not None:
-        with suppress(OSError):
-            sys.stderr.write(f"conformance: {sentence}\n")
-            sys.stderr.flush()
+    ending.say("conformance", sentence)
 
 
 def tell(text: str) -> None:
@@ -34,9 +30,7 @@ def tell(text: str) -> None:
     except OSError as error:
         if not isinstance(error, BrokenPipeError):  # as `| head` ends it
             say(f"stdout: {error.strerror}; no more is printed")
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
-        os.close(nowhere)
+        ending.give_up_stdout()
 
 
 def show_progress(text: str) -> None:

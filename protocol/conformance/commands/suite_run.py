@@ -14,7 +14,7 @@ from protocol.conformance.bench.ports import described, is_simulated
 from protocol.conformance.bench.stand import stand_beside
 from protocol.conformance.bench.wire import RecordedPort, ReopenablePort
 from protocol.conformance.cases.case import Case
-from protocol.conformance.cases.catalogue import only
+from protocol.conformance.cases.catalog import only
 from protocol.conformance.commands.command_line import UsageError, confirm, say, show_progress, tell
 from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import Profile

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from protocol.trapezoid import Motion, plan
+from protocol.trapezoid import Motion, MotionCommand, ReferenceState
 
 _DELAYS = ((0.0,), (-1.0,), (1.0,), (-1.0, 1.0), (1.0, -1.0))
 """When commands were carried out, within the times that they leave open: the courses that a motion may have taken."""
@@ -31,7 +31,7 @@ class Expectation(NamedTuple):
     began_s: float
     motion: Motion
 
-    def at(self, time_s: float) -> tuple[float, float]:
+    def at(self, time_s: float) -> ReferenceState:
         """Return where the reference should be, and at what speed."""
         return self.motion.at(time_s - self.began_s)
 
@@ -57,7 +57,7 @@ class Reference:
 
     def stand_at(self, time_s: float, angle_deg: float) -> None:
         """Rest at an angle from a time on: what was open before is known now."""
-        resting = Expectation(time_s, Motion(angle_deg, 0.0, angle_deg, ()))
+        resting = Expectation(time_s, Motion.at_rest(angle_deg))
         self._expectations.append(resting)
         self._courses = [self._expectations, *([resting] for _ in _DELAYS[1:])]
 
@@ -67,11 +67,11 @@ class Reference:
         """Take another motion at an instant; its target may depend on where the reference is then."""
         for course, delays in zip(self._courses, _DELAYS, strict=True):
             began_s = instant.middle_s + instant.half_width_s * delays[len(course) % len(delays)]
-            position, speed = _at(course, began_s)
-            motion = plan(position, speed, target_from(position), top_deg_s, rate_deg_s2)
+            state = _at(course, began_s)
+            motion = Motion.of(state, MotionCommand(target_from(state.angle_deg), top_deg_s, rate_deg_s2))
             course.append(Expectation(began_s, motion))
 
-    def at(self, time_s: float) -> tuple[float, float]:
+    def at(self, time_s: float) -> ReferenceState:
         """Return where the reference should be at a time, and its speed."""
         return _at(self._expectations, time_s)
 
@@ -90,6 +90,6 @@ class Reference:
         return min(targets), max(targets)
 
 
-def _at(course: Sequence[Expectation], time_s: float) -> tuple[float, float]:
+def _at(course: Sequence[Expectation], time_s: float) -> ReferenceState:
     running = next((one for one in reversed(course) if one.began_s <= time_s), course[0])
     return running.at(time_s)

@@ -1,9 +1,9 @@
 """The profile: what is known of the table under test, and how far and fast it may be moved."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from protocol.conformance.profile.clauses import specification
 from protocol.conformance.profile.sections import (
@@ -14,13 +14,11 @@ from protocol.conformance.profile.sections import (
     TableProfile,
     Tolerance,
 )
-from protocol.data_file import DataFileError, did_you_mean, read_toml, shown
+from protocol.data_file import read_toml
+from protocol.toml_section import section
+from protocol.toml_table import TomlTable
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
-
-
-_LARGEST = 1e300
-"""A whole number may be beyond all floats."""
 
 
 class ProfileError(ValueError):
@@ -71,98 +69,26 @@ def load_profile(path: Path | None = None) -> Profile:
     Raises:
         ProfileError: the file cannot be read, a key, a type or a value is wrong, or two values contradict each other.
     """
-    values = _read(DEFAULT_FILE)
-    source = DEFAULT_FILE.name
-    if path is not None:
-        values, source = _merged(values, _read(path), str(path)), str(path)
-    return profile_from(values, source)
+    default = TomlTable(DEFAULT_FILE.name, {}, error=ProfileError)
+    top = default if path is None else TomlTable.load(path, ProfileError)
+    return _profile(top, read_toml(DEFAULT_FILE))
 
 
 def profile_from(values: Mapping[str, Any], source: str) -> Profile:
     """Return the profile that plain values, complete, describe; see `load_profile`."""
-    profile = Profile(
-        _section(TableProfile, values, "table", source),
-        _section(SerialProfile, values, "serial", source),
-        _section(MotionValues, values, "limits", source),
-        _section(MotionValues, values, "power_on", source),
-        _section(Tolerance, values, "tolerance", source),
-        _section(MotionAllowed, values, "motion", source),
-        _section(RigProfile, values, "rig", source),
-        {number: str(_value(str, reason, f"{source}: waive.{number}")) for number, reason in values["waive"].items()},
-    )
-    _check_together(profile, source)
+    return _profile(TomlTable(source, values, error=ProfileError), {})
+
+
+def _profile(top: TomlTable, defaults: Mapping[str, Any]) -> Profile:
+    waived = top.table("waive")
+    profile = section(Profile, top, defaults, waive={number: waived.text(number) for number in waived.values})
+    for sentence in (*_wrong_line(profile), *_wrong_motion(profile), *_wrong_waivers(profile)):
+        raise ProfileError(f"{top.file}: {sentence}")
     return profile
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        return read_toml(path)
-    except DataFileError as error:
-        raise ProfileError(str(error)) from error
-
-
-def _merged(defaults: dict[str, Any], changes: Mapping[str, Any], source: str) -> dict[str, Any]:
-    merged = dict(defaults)
-    for section, keys in changes.items():
-        if section not in defaults:
-            raise ProfileError(
-                f"{source}: [{section}] is no section; there are {', '.join(defaults)}{did_you_mean(section, defaults)}"
-            )
-        if not isinstance(keys, dict):
-            raise ProfileError(f"{source}: {section} must be a section, not {shown(keys)}")
-        unknown = [key for key in keys if section != "waive" and key not in defaults[section]]
-        if unknown:
-            raise ProfileError(
-                f"{source}: {section}.{unknown[0]} is not a key; allowed are {', '.join(defaults[section])}"
-                f"{did_you_mean(unknown[0], defaults[section])}"
-            )
-        merged[section] = defaults[section] | keys
-    return merged
-
-
-_Section = TypeVar("_Section")
-
-
-def _section(kind: type[_Section], values: Mapping[str, Any], name: str, source: str) -> _Section:
-    arguments = {
-        entry.name: _value(entry.type, values[name][entry.name], f"{source}: {name}.{entry.name}")
-        for entry in fields(kind)  # type: ignore[arg-type]  # every kind is a dataclass
-    }
-    return kind(**arguments)
-
-
-def _value(wanted: object, value: object, where: str) -> object:
-    """Return a value of the wanted type; all numbers of a profile are at least 0."""
-    if wanted is bool or wanted is str:
-        if not isinstance(value, wanted):
-            raise ProfileError(
-                f"{where} is {shown(value)}; it must be {'true or false' if wanted is bool else 'a text'}"
-            )
-        return value
-    if wanted is int or wanted is float:
-        kinds = (int,) if wanted is int else (int, float)
-        if not isinstance(value, kinds) or isinstance(value, bool) or not 0 <= value <= _LARGEST:
-            raise ProfileError(
-                f"{where} is {shown(value)}; it must be a {'whole number' if wanted is int else 'number'} from 0 up"
-            )
-        return wanted(value)
-    if not isinstance(value, list | tuple) or not all(isinstance(word, str) for word in value):
-        raise ProfileError(f"{where} is {shown(value)}; it must be a list of words")
-    return tuple(value)
-
-
-def _check_together(profile: Profile, source: str) -> None:
-    for sentences in (_wrong_line(profile), _wrong_motion(profile), _wrong_waivers(profile)):
-        for sentence in sentences:
-            raise ProfileError(f"{source}: {sentence}")
 
 
 def _wrong_line(profile: Profile) -> Iterator[str]:
     serial = profile.serial
-    if not 1 <= serial.decimals <= 6:
-        yield f"serial.decimals is {serial.decimals}; it must be 1 to 6"
-    if serial.buffer_bytes < 33:
-        yield f"serial.buffer_bytes is {serial.buffer_bytes}; a line alone needs 33"
     bytes_s = 32 * profile.byte_s
     if serial.timeout_s <= serial.latency_s + bytes_s:
         yield (
@@ -173,9 +99,7 @@ def _wrong_line(profile: Profile) -> Iterator[str]:
 
 def _wrong_motion(profile: Profile) -> Iterator[str]:
     count_deg, reach_deg, tolerance = profile.table.counts_per_deg, profile.motion.reach_deg, profile.tolerance
-    if count_deg <= 0:
-        yield "table.counts_per_deg is 0; it must be above 0"
-    elif reach_deg >= profile.range_deg:
+    if reach_deg >= profile.range_deg:
         yield (
             f"motion.reach_deg is {reach_deg:g}; with table.counts_per_deg {count_deg:g} "
             f"the counter ends at {profile.range_deg:g}"
@@ -187,9 +111,9 @@ def _wrong_motion(profile: Profile) -> Iterator[str]:
         )
     for key in ("speed_deg_s", "acceleration_deg_s2"):
         limit = getattr(profile.limits, key)
-        for section in ("motion", "power_on"):
-            if not 0 < (value := getattr(getattr(profile, section), key)) <= limit:
-                yield (f"{section}.{key} is {value:g}; it must be greater than 0 and at most limits.{key}, {limit:g}")
+        for name in ("motion", "power_on"):
+            if not 0 < (value := getattr(getattr(profile, name), key)) <= limit:
+                yield f"{name}.{key} is {value:g}; it must be greater than 0 and at most limits.{key}, {limit:g}"
 
 
 def _wrong_waivers(profile: Profile) -> Iterator[str]:

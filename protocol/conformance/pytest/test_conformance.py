@@ -12,7 +12,7 @@ from protocol.conformance.bench.ports import SessionError, is_simulated, open_po
 from protocol.conformance.bench.stand import stand_beside
 from protocol.conformance.bench.wire import RecordedPort
 from protocol.conformance.cases.case import Case
-from protocol.conformance.cases.catalogue import all_cases
+from protocol.conformance.cases.catalog import all_cases
 from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import ProfileError, load_profile
 from protocol.conformance.pytest.fixture import PTY, pty_stand_in

@@ -215,10 +215,10 @@ def _motion(motion: MotionRecord) -> Mapping[str, Any]:
     def expectation(one: Expectation) -> dict[str, Any]:
         return {
             "began_s": round(one.began_s, 6),
-            "start_deg": one.motion.start_deg,
-            "start_speed_deg_s": one.motion.start_speed_deg_s,
+            "start_deg": one.motion.start.angle_deg,
+            "start_speed_deg_s": one.motion.start.speed_deg_s,
             "target_deg": one.motion.target_deg,
-            "phases": [list(phase) for phase in one.motion.phases],
+            "phases": [list(segment) for segment in one.motion.segments],
         }
 
     return {

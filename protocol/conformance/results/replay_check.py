@@ -13,7 +13,7 @@ from protocol.conformance.profile.profile import Profile
 from protocol.conformance.results.record import RecordedCase
 from protocol.conformance.results.recorded_lines import BEGIN, Line, crowded_lines, recorded_lines
 from protocol.messages import Command, Verb
-from protocol.trapezoid import Motion, plan
+from protocol.trapezoid import Motion, MotionCommand, ReferenceState
 
 _DELAYS = ((0.0,), (1.0,), (0.0, 1.0), (1.0, 0.0))
 """How late the commands may be carried out, in turn, as a share of what adapter and scheduler may add."""
@@ -63,10 +63,10 @@ class _Course(NamedTuple):
     motion: Motion
     began_s: float
 
-    def at(self, time_s: float) -> tuple[float, float]:
+    def at(self, time_s: float) -> ReferenceState:
         """Return position and speed, rounded so that courses meet again where they rest."""
         position, speed = self.motion.at(time_s - self.began_s)
-        return round(position, 6), round(speed, 6)
+        return ReferenceState(round(position, 6), round(speed, 6))
 
 
 class _Walk:
@@ -156,15 +156,15 @@ class _Walk:
         }
 
     def _moved(
-        self, command: Command, time_s: float, state: tuple[float, float], top_deg_s: float, rate_deg_s2: float
+        self, command: Command, time_s: float, state: ReferenceState, top_deg_s: float, rate_deg_s2: float
     ) -> _Course:
         position, speed = state
         target = float(command.value or 0) + (self._zero_deg if command.verb is Verb.MOVE_TO else position)
         if not speed and abs(target - position) < _SLACK_DEG:
             return _resting(position, time_s)
-        return _Course(plan(position, speed, target, top_deg_s, rate_deg_s2), time_s)
+        return _Course(Motion.of(state, MotionCommand(target, top_deg_s, rate_deg_s2)), time_s)
 
-    def _states(self, time_s: float) -> list[tuple[float, float]]:
+    def _states(self, time_s: float) -> list[ReferenceState]:
         """Return where the table may be, and at what speed; of many places at which it may rest only some."""
         states = {course.at(time_s) for course in self._courses}
         resting = sorted(state for state in states if not state[1])
@@ -178,7 +178,7 @@ class _Walk:
         allowed = self._profile.motion
         if len(self._courses) > _MOST_COURSES:
             return _NOTHING_KNOWN
-        if not any(course.motion.phases for course in self._courses):
+        if not any(course.motion.segments for course in self._courses):
             return ""
         farthest_deg = max(abs(angle) for course in self._courses for angle in _turning_points(course.motion))
         return (
@@ -244,11 +244,11 @@ def _glued_misfit(case: RecordedCase, home_deg: float, profile: Profile) -> Misf
 
 
 def _turning_points(motion: Motion) -> Iterator[float]:
-    """Yield the angles at the ends of a motion's phases: it goes nowhere beyond them."""
+    """Yield the angles at the ends of a motion's segments: it goes nowhere beyond them."""
     time_s = 0.0
-    yield motion.start_deg
-    for phase in motion.phases:
-        time_s += phase.duration_s
+    yield motion.start.angle_deg
+    for segment in motion.segments:
+        time_s += segment.duration_s
         yield motion.at(time_s)[0]
     yield motion.target_deg
 
@@ -258,4 +258,4 @@ def _beyond(value: float, most: float, sentence: str) -> str:
 
 
 def _resting(angle_deg: float, since_s: float) -> _Course:
-    return _Course(Motion(angle_deg, 0.0, angle_deg, ()), since_s)
+    return _Course(Motion.at_rest(angle_deg), since_s)

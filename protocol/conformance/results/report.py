@@ -10,7 +10,7 @@ from pathlib import Path
 
 from protocol.conformance.bench.wire import Event
 from protocol.conformance.cases.case import Case
-from protocol.conformance.cases.catalogue import all_cases
+from protocol.conformance.cases.catalog import all_cases
 from protocol.conformance.judgement.reference import MotionRecord
 from protocol.conformance.judgement.verdict import Measurement, Verdict
 from protocol.conformance.results.record import Header, count_verdicts, versions, write_whole

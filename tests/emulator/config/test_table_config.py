@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from emulator.config.table_config import DEFAULT_FILE, TableConfig, load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import DEFAULT_FILE, ConfigError, TableConfig, load_config
 from emulator.table.table import Table
 
 DEFAULTS = tomllib.loads(DEFAULT_FILE.read_text(encoding="utf-8"))
@@ -57,27 +56,33 @@ def test_an_empty_file_is_the_default_table(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("nonsense = 1", r"nonsense is not a key; allowed here are motor, driver, .*, serial"),
-        ("[motor]\nR = 1", r"motor\.R is not a key; allowed here are resistance_ohm, "),
-        ("[gains.hold]\nkp = 1", r"gains\.hold\.kp is not a key; allowed here are proportional_duty_s_deg, "),
-        ("motor = 3", r"motor must be a section, not 3"),
-        ("[motor.resistance_ohm]\nx = 1", r"motor\.resistance_ohm is \{'x': 1\}; it must be a number"),
-        ('[motor]\nresistance_ohm = "2 ohm"', r"motor\.resistance_ohm is '2 ohm'; it must be a number"),
-        ("[motor]\nresistance_ohm = true", r"motor\.resistance_ohm is True; it must be a number"),
+        ("nonsense = 1", r"nonsense is not a known key; known are control, driver, .*, table"),
+        ("[motor]\nR = 1", r"motor\.R is not a known key; known are inductance_H, "),
+        ("[gains.hold]\nkp = 1", r"gains\.hold\.kp is not a known key; known are derivative_time_s, "),
+        ("motor = 3", r"motor is 3; it must be a table"),
+        ("[motor.resistance_ohm]\nx = 1", r"motor\.resistance_ohm is \{'x': 1\}; it must be a finite number"),
+        ('[motor]\nresistance_ohm = "2 ohm"', r"motor\.resistance_ohm is '2 ohm'; it must be a finite number"),
+        ("[motor]\nresistance_ohm = true", r"motor\.resistance_ohm is True; it must be a finite number"),
         ("[encoder]\nlines = 96.0", r"encoder\.lines is 96\.0; it must be a whole number"),
         ("[serial]\nstrict = 1", r"serial\.strict is 1; it must be true or false"),
-        ("[motor]\nresistance_ohm = nan", r"motor\.resistance_ohm is nan; it must be finite"),
-        ("[motor]\nresistance_ohm = inf", r"motor\.resistance_ohm is inf; it must be finite"),
-        ("[motor]\nresistance_ohm = -2.18", r"motor\.resistance_ohm is -2\.18; it must be at least 0\.001"),
-        ("[motor]\ninductance_H = 1e-310", r"motor\.inductance_H is 1e-310; it must be at least 1e-06"),
+        ("[motor]\nresistance_ohm = nan", r"motor\.resistance_ohm is nan; it must be a finite number"),
+        ("[motor]\nresistance_ohm = inf", r"motor\.resistance_ohm is inf; it must be a finite number"),
+        (
+            "[motor]\nresistance_ohm = -2.18",
+            r"motor\.resistance_ohm is -2\.18; it must be a finite number at least 0\.001",
+        ),
+        (
+            "[motor]\ninductance_H = 1e-310",
+            r"motor\.inductance_H is 1e-310; it must be a finite number at least 1e-06 and at most 10",
+        ),
         (
             f"[motor]\nresistance_ohm = 1{'0' * 400}",
-            r"motor\.resistance_ohm is an integer of 1329 bits; it must be at most 10000",
+            r"motor\.resistance_ohm is 10+\.\.\.; it must be .* at most 10000",
         ),
-        ("[driver]\nsupply_V = 0", r"driver\.supply_V is 0; it must be greater than 0"),
-        ("[driver]\npwm_bits = 12", r"driver\.pwm_bits is 12; it must be at most 11"),
-        ("[gears]\nefficiency = 1.1", r"gears\.efficiency is 1\.1; it must be at most 1"),
-        ("[serial]\ndecimals = 0", r"serial\.decimals is 0; it must be at least 1"),
+        ("[driver]\nsupply_V = 0", r"driver\.supply_V is 0; it must be a finite number above 0"),
+        ("[driver]\npwm_bits = 12", r"driver\.pwm_bits is 12; it must be a whole number from 4 to 11"),
+        ("[gears]\nefficiency = 1.1", r"gears\.efficiency is 1\.1; it must be .* at most 1"),
+        ("[serial]\ndecimals = 0", r"serial\.decimals is 0; it must be a whole number from 1 to 6"),
         ("[power_on]\nspeed_deg_s = 41", r"power_on\.speed_deg_s is 41; it must be at most limits\.speed_deg_s, 40"),
         (
             "[power_on]\nspeed_deg_s = 1e-9",
@@ -98,29 +103,35 @@ def test_an_empty_file_is_the_default_table(tmp_path: Path) -> None:
         ("[settling]\napproach_speed_deg_s = 1e-9", r"approach_speed_deg_s is 1e-09; .* holds at least 2\.9"),
         ("[gears]\nratio = 480.1234567", r"is 480\.1234567; .* 32 bits.*; the nearest ratio that fits is \"\d+/\d+\""),
         ("[gears]\nratio = 81.37037037037", r"is 81\.37037037037; .*; the nearest ratio that fits is \"2197/27\""),
-        ("[gears]\nratio = '2197:27'", r"is '2197:27'; it must be a number, or a fraction .* such as \"2197/27\""),
-        ("[gears]\nratio = '2197/0'", r"is '2197/0'; it must be a number, or a fraction"),
-        ("[gears]\nratio = '1/2'", r"gears\.ratio is 0\.5; it must be at least 1"),
+        (
+            "[gears]\nratio = '2197:27'",
+            r"is '2197:27'; it must be a finite number, or a fraction such as \"7/3\", at least 1",
+        ),
+        ("[gears]\nratio = '2197/0'", r"is '2197/0'; it must be a finite number, or a fraction"),
+        ("[gears]\nratio = '1/2'", r"gears\.ratio is '1/2'; it must be .* at least 1"),
         (
             "[gears]\nratio = 1e5\n[encoder]\nlines = 9000",
             r"a turn is 3\.6e\+09 counts; it must be at most 2147483647: ",
         ),
-        ("[control]\nspeed_window_ticks = 257", r"speed_window_ticks is 257; it must be at most 256"),
+        ("[control]\nspeed_window_ticks = 257", r"speed_window_ticks is 257; it must be a whole number from 1 to 256"),
         ("motor = [", r"is not TOML: "),
         (f"[encoder]\nlines = {'9' * 5000}", r"is not TOML: "),
-        (f"[encoder]\nlines = 0x{'f' * 5000}", r"encoder\.lines is an integer of 20000 bits; it must be at most"),
-        (f"motor = 0x{'f' * 5000}", r"motor must be a section, not an integer of 20000 bits"),
-        (f"motor = [0x{'f' * 5000}]", r"motor must be a section, not \[an integer of 20000 bits\]"),
-        (f"faults = [0x{'f' * 5000}]", r"each fault is a table"),
-        (f"[[faults]]\nfault = 'drop'\nprobability = 0x{'f' * 5000}", r"probability is an integer of 20000 bits"),
-        (f"motor = {'[' * 300}{']' * 300}", r"motor must be a section, not \[\["),
-        (f"motor = {'[' * 900}{']' * 900}", r"nested too deeply|must be a section"),
+        (
+            f"[encoder]\nlines = 0x{'f' * 5000}",
+            r"encoder\.lines is a very long int; it must be a whole number from",
+        ),
+        (f"motor = 0x{'f' * 5000}", r"motor is a very long int; it must be a table"),
+        (f"motor = [0x{'f' * 5000}]", r"motor is a very long list; it must be a table"),
+        (f"faults = [0x{'f' * 5000}]", r"faults is a very long list; it must be a list of tables"),
+        (f"[[faults]]\nfault = 'drop'\nprobability = 0x{'f' * 5000}", r"probability is a very long int"),
+        (f"motor = {'[' * 300}{']' * 300}", r"motor is \[\[.*; it must be a table"),
+        (f"motor = {'[' * 900}{']' * 900}", r"nested too deeply|it must be a table"),
         (f"motor = {'[' * 5000}{']' * 5000}", r"nested too deeply"),
-        (f"motor = {'{a=' * 900}1{'}' * 900}", r"nested too deeply|must be a section|a is not a key"),
-        (f"[{'a.' * 5000}a]", r"is not a key|nested too deeply"),
-        (f"'{'k' * 5000}' = 1", r"k is not a key"),
+        (f"motor = {'{a=' * 900}1{'}' * 900}", r"nested too deeply|must be a table|a is not a known key"),
+        (f"[{'a.' * 5000}a]", r"is not a known key|nested too deeply"),
+        (f"'{'k' * 5000}' = 1", r"k\.\.\. is not a known key"),
         (f"# {'x' * (1 << 20)}", r"is larger than 1 MB"),
-        ("[motor]\nresistance_ohm = 2026-11-28", r"resistance_ohm is datetime.*; it must be a number"),
+        ("[motor]\nresistance_ohm = 2026-11-28", r"resistance_ohm is datetime.*; it must be a finite number"),
     ],
 )
 def test_what_cannot_be_used_is_refused_in_one_line(text: str, message: str, tmp_path: Path) -> None:
@@ -159,7 +170,7 @@ def test_a_table_is_refused_or_it_runs(key: str, value: float, tmp_path_factory:
 def test_serial_settings_are_changed_by_name_and_none_keeps_them() -> None:
     config = load_config().with_serial(baud=115200, decimals=None, strict=True)
     assert (config.serial.baud, config.serial.decimals, config.serial.strict) == (115200, 1, True)
-    with pytest.raises(ConfigError, match=r"serial settings: serial\.decimals is 7; it must be at most 6"):
+    with pytest.raises(ConfigError, match=r"serial settings: serial\.decimals is 7; it must be .* from 1 to 6"):
         load_config().with_serial(decimals=7)
 
 

@@ -1,4 +1,4 @@
-"""The catalogue: what is a fault, by the same names and numbers everywhere."""
+"""The catalog: what is a fault, by the same names and numbers everywhere."""
 
 import json
 import math
@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import pytest
 
-from emulator.config.table_config import load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, load_config
 from emulator.faults import fault
 from emulator.faults.fault import KINDS, FaultError, fault_from, parameters_of
 from emulator.server.control_commands import COMMANDS

@@ -8,8 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from emulator.config.constants import firmware_constants, fixed_gains
-from emulator.config.table_config import GainsConfig, load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, GainsConfig, load_config
 from emulator.firmware.fixed_point import ERROR_BITS, OUTPUT_BITS
 from emulator.firmware.pid import HOLD, RAMP, Gains, Pid, PidState, step
 from emulator.int32 import INT32_MAX
@@ -33,7 +32,7 @@ def regulator(ramp: Gains, hold: Gains | None = None) -> Pid:
         st.tuples(st.integers(-100 * COUNT, 100 * COUNT), st.integers(-100, 100)), min_size=1, max_size=30
     ),
 )
-def test_the_law_is_that_of_real_numbers_within_its_quantisation(gains: Gains, demands: list[tuple[int, int]]) -> None:
+def test_the_law_is_that_of_real_numbers_within_its_quantization(gains: Gains, demands: list[tuple[int, int]]) -> None:
     """u = K e + sum(Ki e) - Kd d(omega); the integral loses up to a unit of its last place a tick, u half a step."""
     parameters, state, integral = regulator(gains), REST, Fraction(0)
     for tick, (demand, measured) in enumerate(demands, start=1):

@@ -1,4 +1,4 @@
-"""The exact discretisation of the motor against scipy: its matrix exponential, and its stiff solvers."""
+"""The exact discretization of the motor against scipy: its matrix exponential, and its stiff solvers."""
 
 import math
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from emulator.plant.motor import Motor, discretise, matrix_exponential
+from emulator.plant.motor import Motor, discretize, matrix_exponential
 
 RE_25 = {"resistance_ohm": 2.18, "inductance_H": 0.238e-3, "torque_constant_Nm_A": 23.4e-3}
 
@@ -34,7 +34,7 @@ motors = st.fixed_dictionaries(
 def step_matrix(motor: dict[str, float]) -> NDArray[np.float64]:
     values = dict(motor)
     inertia_kg_m2, tick_s = values.pop("inertia_kg_m2"), values.pop("tick_s")
-    return np.array(discretise(Motor(rotor_inertia_kg_m2=inertia_kg_m2, **values), inertia_kg_m2, tick_s)).reshape(3, 4)
+    return np.array(discretize(Motor(rotor_inertia_kg_m2=inertia_kg_m2, **values), inertia_kg_m2, tick_s)).reshape(3, 4)
 
 
 def test_columns_are_the_response_to_each_state_and_input() -> None:

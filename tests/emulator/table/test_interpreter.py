@@ -14,6 +14,7 @@ from emulator.firmware.controller import MOVING, FirmwareState, power_on
 from emulator.firmware.profiler import Profile, Reference
 from emulator.int32 import INT32_MAX
 from emulator.table.interpreter import CARRIED_OUT, Interpreter, Registers
+from protocol.codec import encode_reply
 from protocol.messages import VERBS, Angle, Command, ErrorCode, Ok, Refusal, Reply, Verb
 
 CONFIG = load_config()
@@ -51,6 +52,30 @@ def distance(state: FirmwareState) -> int:
 
 def test_power_on_takes_speed_and_acceleration_from_the_configuration() -> None:
     assert Registers(round(10 * 0.512 * ONE), round(20 * 0.000512 * ONE), 0) == REGISTERS
+
+
+@pytest.mark.parametrize("limit", ["33.3", "0.1", "40"])
+def test_a_limit_holds_for_the_decimal_that_the_file_states(limit: str) -> None:
+    value = float(limit)
+    motion = replace(CONFIG.limits, speed_deg_s=value, acceleration_deg_s2=value)
+    interpreter = Interpreter(replace(CONFIG, limits=motion))
+    for verb in (Verb.SET_SPEED, Verb.SET_ACCELERATION):
+        at_limit = interpreter.execute(Command(verb, Decimal(limit)), controller(), REGISTERS)[0]
+        above = interpreter.execute(Command(verb, Decimal(limit) + Decimal("1e-25")), controller(), REGISTERS)[0]
+        assert (at_limit, above) == (Ok(), OUT_OF_RANGE)
+
+
+def test_an_angle_just_below_half_a_digit_is_not_rounded_twice() -> None:
+    config = replace(
+        CONFIG, encoder=replace(CONFIG.encoder, lines=97), gears=replace(CONFIG.gears, ratio=1009.0)
+    ).with_serial(decimals=6)
+    turn = int(config.counts_per_turn)
+    for nearest in range(-9, 10, 2):  # how far the angle of the count is beside the middle between two digits
+        count = (turn // 4 + nearest) // 2 * pow(90_000_000, -1, turn // 4) % (turn // 4)
+        angle = Interpreter(config).angle_deg(count)
+        digits = Fraction(count * 360, turn) * 10**6
+        assert 0 < abs(digits % 1 - Fraction(1, 2)) < Fraction(1, 10**4)
+        assert encode_reply(Angle(Verb.READ_POSITION, angle), 6) == b"H %d.%06d\r" % divmod(round(digits), 10**6)
 
 
 @pytest.mark.parametrize("count", [0, 1, -1, 512, INT32_MAX, -INT32_MAX - 1])

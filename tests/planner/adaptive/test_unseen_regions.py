@@ -27,7 +27,7 @@ def test_two_patches_are_two_regions_with_their_areas_and_reasons() -> None:
     assert regions[0].area_mm2 == pytest.approx(40.0 * 100.0, rel=0.1)
     assert regions[1].area_mm2 == pytest.approx(20.0 * 30.0, rel=0.25)
     assert regions[0].can_be_seen_mm2 == pytest.approx(0.5 * regions[0].area_mm2, rel=0.1)
-    np.testing.assert_allclose(regions[0].centre_W, (30.0, 0.0, 5.0), atol=3.0)
+    np.testing.assert_allclose(regions[0].center_W, (30.0, 0.0, 5.0), atol=3.0)
     np.testing.assert_allclose(regions[0].normal_W, (0.0, 0.0, 1.0), atol=1e-9)
 
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from planner.cell.bodies import FLANGE_FRAME, Bodies, load_bodies
 from planner.cell.cell import Cell, placement
-from planner.cell.clearance import Clearances, clearances
 from planner.cell.collision_model import CollisionModel, collision_model
 from planner.cell.obstacles import Obstacle, box, cell_obstacles, cylinder, sphere, workpiece_obstacle
+from planner.cell.pose_clearance import Clearances, clearances
 from planner.cell.scan import load_scan
 from planner.cell.workpiece import Cylinder, Mould, Sphere
 from planner.geometry.solid import BOX, CYLINDER

@@ -11,6 +11,7 @@ from planner.kinematics.inverse_kinematics import inverse_kinematics
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
 from tests.planner.clearance_sweep import MESHES, coal_clearance, coal_mesh, compared, with_mesh
+from tests.planner.goals import goal_flange_poses
 
 POSES, TRIANGLES = 40, 2000
 
@@ -31,7 +32,7 @@ def test_no_allowed_cell_of_a_map_collides_with_the_mesh(make: Callable[[int], t
     problem, n_angles, surface = map_problem(scan), 24, coal_mesh(scan.mesh)
     maps = build_maps(problem, list(Configuration), n_angles)
     angles_deg = np.linspace(0.0, 360.0, n_angles, endpoint=False)
-    goals = scan.cell.goal_flange_poses(problem.T_WS, angles_deg)
+    goals = goal_flange_poses(scan.cell, problem.T_WS, angles_deg)
     rng, least_mm, checked = np.random.default_rng(2), np.inf, 0
     for configuration, each in maps.items():
         for location, angle in rng.permutation(np.argwhere(each.allowed))[:8]:

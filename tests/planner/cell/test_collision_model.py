@@ -17,21 +17,21 @@ def model_with(*obstacles: Obstacle, bodies: Bodies = BODIES) -> tuple[Collision
     return collision_model(bodies, obstacles, CELL.T_BT, CELL.T_FS)
 
 
-def test_each_pair_that_can_meet_is_looked_at_and_no_neighbours() -> None:
+def test_each_pair_that_can_meet_is_looked_at_and_no_neighbors() -> None:
     _, names = model_with(*cell_obstacles(CELL))
     assert "probe and table" in names
     assert "probe and forearm" in names
     assert "forearm and base" in names
     assert "beam and upper arm" in names
-    for neighbours in (
+    for neighbors in (
         "elbow and upper arm",
         "wrist and forearm",
         "probe and wrist",
         "base and table",
         "beam and probe",
     ):
-        assert neighbours not in names
-        assert " and ".join(reversed(neighbours.split(" and "))) not in names
+        assert neighbors not in names
+        assert " and ".join(reversed(neighbors.split(" and "))) not in names
 
 
 def test_light_passes_what_does_not_stop_it_and_the_arm_does_not() -> None:

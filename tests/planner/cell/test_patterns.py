@@ -64,13 +64,13 @@ def test_a_pattern_has_no_jumps(kind: str, pattern: str) -> None:
 @pytest.mark.parametrize("pattern", ["meridians", "spiral"])
 def test_the_line_passes_over_the_whole_sphere_between_the_polar_angles(pattern: str) -> None:
     sphere = WORKPIECES["sphere"]
-    centre = np.add(sphere.middle_mm, (0.0, 0.0, 80.0))
+    center = np.add(sphere.middle_mm, (0.0, 0.0, 80.0))
     points = sphere.mesh().vertices
-    polar = np.degrees(np.arccos((points[:, 2] - centre[2]) / 80.0))
+    polar = np.degrees(np.arccos((points[:, 2] - center[2]) / 80.0))
     wanted = points[(polar > LAYOUT.top_polar_deg + 5.0) & (polar < LAYOUT.lowest_polar_deg - 5.0)]
     # The line is straight, so its ends stand off the sphere: compare directions from the center.
-    covered = covered_points(waypoints_of("sphere", pattern)) - centre
-    assert _greatest_gap(_unit(covered) * 80.0, wanted - centre) < 6.0
+    covered = covered_points(waypoints_of("sphere", pattern)) - center
+    assert _greatest_gap(_unit(covered) * 80.0, wanted - center) < 6.0
 
 
 @pytest.mark.parametrize("pattern", ["rings", "helix"])
@@ -111,7 +111,7 @@ def _greatest_gap(covered: FloatArray, wanted: FloatArray) -> float:
 @pytest.mark.parametrize("overlap", [0.0, 0.2, 0.5])
 def test_strips_lie_a_line_width_less_the_overlap_apart_at_most(overlap: float) -> None:
     layout = StripLayout(overlap=overlap)
-    middles = layout.strip_centres(300.0, 60.0)
+    middles = layout.strip_centers(300.0, 60.0)
     assert np.diff(middles).max() <= 60.0 * (1.0 - overlap) + 1e-9
     assert middles[0] == pytest.approx(-120.0)
     assert middles[-1] == pytest.approx(120.0)
@@ -120,7 +120,7 @@ def test_strips_lie_a_line_width_less_the_overlap_apart_at_most(overlap: float) 
 
 
 def test_a_span_narrower_than_the_line_takes_one_strip_in_its_middle() -> None:
-    np.testing.assert_array_equal(LAYOUT.strip_centres(40.0, 60.0), [0.0])
+    np.testing.assert_array_equal(LAYOUT.strip_centers(40.0, 60.0), [0.0])
 
 
 def test_a_crossed_raster_turns_the_line_by_a_right_angle() -> None:

@@ -10,6 +10,7 @@ from planner.defaults import shipped_scans
 from planner.errors import PlannerError, ScanFileError, WorkpieceError
 from planner.kinematics.inverse_kinematics import inverse_kinematics
 from planner.reasons import Reason
+from tests.planner.goals import goal_flange_poses
 
 SCANS = Path(__file__).parents[3] / "planner" / "scans"
 
@@ -32,7 +33,7 @@ def test_a_shipped_scan_has_about_a_hundred_locations_each_reached_at_some_table
     scan = load_scan(name)
     assert scan.name == name
     assert 90 <= scan.path.count <= 110
-    goals = scan.cell.goal_flange_poses(scan.path.T_WS, np.arange(0.0, 360.0, 10.0))
+    goals = goal_flange_poses(scan.cell, scan.path.T_WS, np.arange(0.0, 360.0, 10.0))
     _, reasons = inverse_kinematics(scan.cell.arm, goals.reshape(-1, 4, 4))
     reached = (reasons == Reason.REACHED).reshape(*goals.shape[:2], 8)
     assert reached.any(axis=1).all(axis=0).any(), "no configuration reaches every location"
@@ -42,7 +43,7 @@ def test_a_shipped_scan_has_about_a_hundred_locations_each_reached_at_some_table
 @pytest.mark.parametrize("name", ["sphere", "cylinder"])
 def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
     scan = load_scan(name)
-    goals = scan.cell.goal_flange_poses(scan.path.T_WS, np.arange(0.0, 360.0, 5.0))
+    goals = goal_flange_poses(scan.cell, scan.path.T_WS, np.arange(0.0, 360.0, 5.0))
     _, reasons = inverse_kinematics(scan.cell.arm, goals.reshape(-1, 4, 4))
     reached = (reasons == Reason.REACHED).reshape(*goals.shape[:2], 8)
     assert not reached.all(axis=0).any(), "one table angle serves the whole path"
@@ -56,7 +57,7 @@ def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
             "diameter_cm = 16",
             "workpiece.diameter_mm is missing; it must be a finite number above 0",
         ),
-        ("diameter_mm = 160", "diameter_mm = 160\ncolour = 1", "workpiece.colour is not a known key; known are class,"),
+        ("diameter_mm = 160", "diameter_mm = 160\ncolor = 1", "workpiece.color is not a known key; known are class,"),
         (
             "diameter_mm = 160",
             "diameter_mm = -160",
@@ -122,7 +123,7 @@ def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
         (
             "diameter_mm = 160",
             "diameter_mm = 0.16",
-            "longest side is 0.16 mm; allowed is 10 to 1000 mm; is it in metres?",
+            "longest side is 0.16 mm; allowed is 10 to 1000 mm; is it in meters?",
         ),
         ("diameter_mm = 160", "diameter_mm = 510", "reaches 255.0 mm from the table's axis"),
         ("[0, 0, 60, 0, 0, 0]", "[0, 0, -60, 0, 0, 0]", "reaches 60.0 mm below the table's top"),
@@ -179,7 +180,7 @@ def test_a_mesh_of_no_class_needs_a_path_file(tmp_path: Path) -> None:
 def test_a_fault_of_the_mesh_names_both_files(tmp_path: Path) -> None:
     trimesh.creation.box((0.08, 0.08, 0.08)).export(tmp_path / "part.stl")
     file = changed(tmp_path, "cylinder", "diameter_mm = 140\nheight_mm = 180", 'mesh = "part.stl"')
-    with pytest.raises(WorkpieceError, match="is it in metres") as refusal:
+    with pytest.raises(WorkpieceError, match="is it in meters") as refusal:
         load_scan(file)
     assert "scan.toml" in str(refusal.value)
     assert "part.stl" in str(refusal.value)

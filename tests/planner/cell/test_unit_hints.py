@@ -38,25 +38,25 @@ def test_a_sound_scan_looks_like_no_other_unit(name: str) -> None:
 @pytest.mark.parametrize(
     ("cell", "expected"),
     [
-        ("table_in_base = [0.57, 0, 0.12, 0, 0, 0]", "cell.table_in_base is 0.582 mm long: is it in metres"),
-        ("probe_on_flange = [0, 0, 0.1, 0, 0, 0]", "cell.probe_on_flange is 0.1 mm long: is it in metres"),
-        ("workpiece_on_table = [0, 0, 0.08, 0, 0, 0]", "cell.workpiece_on_table is 0.08 mm long: is it in metres"),
+        ("table_in_base = [0.57, 0, 0.12, 0, 0, 0]", "cell.table_in_base is 0.582 mm long: is it in meters"),
+        ("probe_on_flange = [0, 0, 0.1, 0, 0, 0]", "cell.probe_on_flange is 0.1 mm long: is it in meters"),
+        ("workpiece_on_table = [0, 0, 0.08, 0, 0, 0]", "cell.workpiece_on_table is 0.08 mm long: is it in meters"),
         ("table_in_base = [570, 0, 120, 1.5708, 0, 0]", "cell.table_in_base turns by 1.5708 deg: is it in radians"),
         ("probe_on_flange = [0, 0, 100, 0, 3.14159, 0]", "cell.probe_on_flange turns by 3.1416 deg: is it in radians"),
     ],
 )
-def test_a_placement_in_metres_or_radians_is_named(tmp_path: Path, cell: str, expected: str) -> None:
+def test_a_placement_in_meters_or_radians_is_named(tmp_path: Path, cell: str, expected: str) -> None:
     hint = hint_of(tmp_path, cell)
     assert hint is not None
     assert expected in hint
     assert hint.count("\n") == 0
 
 
-def test_a_path_in_metres_or_radians_is_named(tmp_path: Path) -> None:
+def test_a_path_in_meters_or_radians_is_named(tmp_path: Path) -> None:
     azimuth = np.radians(np.arange(0.0, 360.0, 20.0))
     rows = [(200.0 * np.cos(a), 200.0 * np.sin(a), 50.0, np.degrees(a) + 180.0, 90.0, 0.0) for a in azimuth]
     for name, scale, expected in (
-        ("metres", (0.001, 0.001, 0.001, 1.0, 1.0, 1.0), "within 0.2 mm: is it in metres"),
+        ("meters", (0.001, 0.001, 0.001, 1.0, 1.0, 1.0), "within 0.2 mm: is it in meters"),
         ("radians", (1.0, 1.0, 1.0, np.pi / 180, np.pi / 180, np.pi / 180), "is it in radians"),
         ("sound", (1.0,) * 6, None),
     ):

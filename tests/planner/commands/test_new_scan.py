@@ -81,7 +81,7 @@ def test_a_plan_has_room_where_the_table_may_be_a_little_beside_it(angle_deg: fl
 
 
 def test_the_file_says_the_same_as_the_scan_that_was_checked(tmp_path: Path) -> None:
-    for name in ("bracket", "set upright", "off centre"):
+    for name in ("bracket", "set upright", "off center"):
         own = OWN_PARTS[name]
         own.mesh.export(tmp_path / "part.ply")
         mesh = load_mesh(tmp_path / "part.ply")
@@ -125,7 +125,7 @@ def without_a_triangle() -> trimesh.Trimesh:
     [
         (trimesh.creation.box((600.0, 80.0, 80.0)), (), r"reaches 302\.7 mm from the table's axis; it must stay"),
         (trimesh.creation.box((1600.0, 80.0, 80.0)), (), r"longest side is 1600 mm; allowed is 10 to 1000 mm"),
-        (trimesh.creation.box((0.08, 0.08, 0.08)), (), r"is it in metres\? Then set unit"),
+        (trimesh.creation.box((0.08, 0.08, 0.08)), (), r"is it in meters\? Then set unit"),
         (without_a_triangle(), (), r"the mesh is open at 3 edges"),
         (trimesh.creation.box((80.0, 80.0, 80.0)), ("--class", "mould"), r"no cavity in the middle of its top"),
     ],

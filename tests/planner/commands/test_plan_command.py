@@ -15,7 +15,7 @@ SMALL = ["--angles", "60", "--configuration", "LEFTY-ABOVE-NOFLIP"]
 def test_a_shipped_scan_gives_a_plan_a_picture_and_a_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "mould", *SMALL, "--out", str(tmp_path / "new")]) == 0
     assert sorted(file.name for file in (tmp_path / "new").iterdir()) == ["arm.png", "map.npz", "plan.json", "plan.png"]
-    plan = load_plan(tmp_path / "new" / "plan.json")
+    plan = load_plan(tmp_path / "new" / "plan.json").plan
     assert plan.configuration == "LEFTY-ABOVE-NOFLIP"
     assert np.abs(plan.speeds_deg_s).max() <= 40.0 + 1e-9
     out = capsys.readouterr().out
@@ -31,7 +31,7 @@ def test_the_best_configuration_is_the_cheapest_of_all_eight(
     told = capsys.readouterr().err.splitlines()
     assert len(told) == 8
     costs = {line.split()[0]: float(line.split()[-1]) for line in told if " cost " in line}
-    plan = load_plan(tmp_path / "plan.json")
+    plan = load_plan(tmp_path / "plan.json").plan
     assert plan.configuration == min(costs, key=lambda name: costs[name])
     assert plan.cost.total == pytest.approx(min(costs.values()), abs=1e-3)
 
@@ -45,14 +45,14 @@ def test_compare_has_a_line_for_each_planner_and_keeps_the_start(
     assert [line.split()[0] for line in table] == list(PLANNERS)
     executable = [line for line in table if not line.startswith("local_maxima")]
     assert all(line.split()[2:4] == ["0", "yes"] for line in executable), table
-    assert load_plan(tmp_path / "plan.json").angles_deg[0] == 10.0
+    assert load_plan(tmp_path / "plan.json").plan.angles_deg[0] == 10.0
 
 
 def test_smoothing_lowers_the_peaks_and_never_raises_the_cost(tmp_path: Path) -> None:
     rays = [*SMALL, "--planner", "ray_shooting"]
     assert main(["plan", "mould", *rays, "--out", str(tmp_path / "rough")]) == 0
     assert main(["plan", "mould", *rays, "--smooth", "--out", str(tmp_path / "smooth")]) == 0
-    rough, smooth = (load_plan(tmp_path / name / "plan.json") for name in ("rough", "smooth"))
+    rough, smooth = (load_plan(tmp_path / name / "plan.json").plan for name in ("rough", "smooth"))
     assert smooth.planner == "ray_shooting+smoothing"
     assert np.sum(smooth.accelerations_deg_s2**4) < np.sum(rough.accelerations_deg_s2**4)  # led by the peaks
     assert smooth.cost.total <= rough.cost.total

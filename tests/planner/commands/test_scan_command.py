@@ -13,17 +13,19 @@ from planner.__main__ import main
 from planner.arrays import FloatArray
 from planner.cell.scan import load_scan
 from planner.defaults import shipped_scans
-from planner.execution.free_way import WayError
+from planner.execution.clear_path import BlockedPathError
+from planner.execution.run_input import RunInput
+from planner.kinematics.arm import Arm
 from planner.map.synthetic_maps import blocks_map
 from planner.planning import scan_planning
 from planner.planning.arm_motion import ArmMotion, arm_motion
 from planner.planning.plan import Plan
+from planner.planning.problem import Problem
 from planner.scanning import scan_run
 from planner.scanning.scan_file import scan_document
 from planner.scanning.scan_report import scan_report
-from planner.scanning.scan_run import Planned, ScanOptions, run_on_port, scan_workpiece
+from planner.scanning.scan_run import ScanOptions, run_on_port, scan_workpiece
 from planner.table.cost import PathCost
-from planner.table.motion import Limits
 
 SMALL = """
 [cell]
@@ -87,7 +89,7 @@ def test_a_shipped_scan_gives_a_cloud_on_the_part_and_a_report(
     assert not re.search("https?://(?!www.w3.org/)", page)
 
 
-def test_three_decimals_without_backlash_and_with_exact_calibration_lie_within_30_micrometres(
+def test_three_decimals_without_backlash_and_with_exact_calibration_lie_within_30_micrometers(
     scan_file: str, tmp_path: Path
 ) -> None:
     (tmp_path / "table.toml").write_text(EXACT)
@@ -100,7 +102,7 @@ def test_three_decimals_without_backlash_and_with_exact_calibration_lie_within_3
     assert parts["backlash"]["displacement_mm"] < 0.003  # to a count of the encoder
 
 
-def test_encoder_and_backlash_of_the_account_are_those_of_the_table_at_the_port(scan_file: str, tmp_path: Path) -> None:
+def test_encoder_and_backlash_of_the_budget_are_those_of_the_table_at_the_port(scan_file: str, tmp_path: Path) -> None:
     (tmp_path / "table.toml").write_text("[encoder]\nlines = 24\n[gears]\nbacklash_arcmin = 30.0\n")
     options = ["--decimals", "3", "--exact-calibration", "--port", f"emulator://?config={tmp_path / 'table.toml'}"]
     assert main(["scan", scan_file, *QUICK, *options, "--rate", "10", "--out", str(tmp_path)]) == 0
@@ -184,7 +186,7 @@ def without_a_triangle() -> trimesh.Trimesh:
     ("mesh", "message"),
     [
         (without_a_triangle(), "the mesh is open"),
-        (trimesh.creation.box((0.05, 0.05, 0.05)), "is it in metres?"),
+        (trimesh.creation.box((0.05, 0.05, 0.05)), "is it in meters?"),
         (trimesh.creation.box((600.0, 50.0, 50.0)), "must stay within the table's radius of 250 mm"),
         (trimesh.creation.box((50.0, 50.0, 50.0)), "25.0 mm below the table's top"),
     ],
@@ -275,6 +277,6 @@ def test_a_run_up_through_a_forbidden_region_is_refused_before_the_port_is_opene
     plan = Plan("", "", 0.1, np.arange(100.0, 132.0, 2.0), speeds, np.zeros(15), PathCost(0.0, 0.0, 0.0))
     just_before = blocks_map(16, 360, [(0, 0, 96, 98)], edge=1)
     monkeypatch.setattr(scan_run, "open_port", lambda *_: pytest.fail("the port was opened"))
-    planned = Planned(plan, np.zeros((16, 6)), Limits(), just_before)
-    with pytest.raises(WayError, match="run-up at location 0 takes the table from 9"):
+    planned = RunInput("", plan, Problem(just_before, 0.1), np.zeros((16, 6)), Arm.load())
+    with pytest.raises(BlockedPathError, match="run-up at location 0 takes the table from 9"):
         run_on_port(planned, ScanOptions(), lambda _: None)

@@ -25,15 +25,15 @@ QUICK = ["--angles", "8", "--configuration", "LEFTY-ABOVE-NOFLIP"]
 POSES = np.array(
     [(200.0 * np.cos(a), 200.0 * np.sin(a), 50.0, np.degrees(a) + 180.0, 90.0, 0.0) for a in np.linspace(0.0, 5.0, 12)]
 )
-METRES, RADIANS = np.repeat((1e-3, 1.0), 3), np.repeat((1.0, np.pi / 180.0), 3)
+METERS, RADIANS = np.repeat((1e-3, 1.0), 3), np.repeat((1.0, np.pi / 180.0), 3)
 
 
 @pytest.mark.parametrize("command", ["map", "plan", "scan"])
 @pytest.mark.parametrize(
     ("cell", "scale", "expected"),
     [
-        ("table_in_base = [0.57, 0, 0.12, 0, 0, 0]", None, "cell.table_in_base is 0.582 mm long: is it in metres?"),
-        ("", METRES, "all poses of the path are within 0.225 mm: is it in metres?"),
+        ("table_in_base = [0.57, 0, 0.12, 0, 0, 0]", None, "cell.table_in_base is 0.582 mm long: is it in meters?"),
+        ("", METERS, "all poses of the path are within 0.225 mm: is it in meters?"),
         ("", RADIANS, "no pose of the path turns by more than 8.29 deg: is it in radians?"),
     ],
 )

@@ -60,7 +60,7 @@ def _way_deg(table: Table, snapshot: Snapshot) -> float:
 @pytest.mark.parametrize("name", shipped_scans())
 def test_after_a_cut_at_any_moment_a_shipped_plan_runs_on_by_less_than_is_promised(name: str) -> None:
     run_input = shipped_run_input(name)
-    motion = TableMotion(run_input.plan, run_input.problem.limits)
+    motion = run_input.motion()
     record, ways_deg = ways_after_a_cut(motion, run_input.problem.limits, 90.0)
     assert record.failure is None
     assert len(ways_deg) > 30

@@ -8,7 +8,7 @@ from planner.execution.run_file import RunConditions, StoredRun
 from planner.execution.run_plots import deviation_figure, map_figure, motion_figure
 from planner.execution.run_record import Observation, Record
 from planner.execution.run_verification import verify_run
-from planner.execution.table_motion import PauseTimes, TableMotion
+from planner.execution.table_motion import PauseTimes
 from planner.table.wire import Wire
 from tests.planner.drawn import Drawn
 from tests.planner.run_examples import short_run_input
@@ -19,7 +19,7 @@ LEAD_S, LAG_S, OFF_DEG = 0.05, 0.02, 0.07
 def stored_run() -> StoredRun:
     """Return a run in which the encoder is off by a constant, beside its lag; its reference is early by the lead."""
     run_input = short_run_input()
-    motion = TableMotion(run_input.plan, run_input.problem.limits)
+    motion = run_input.motion()
     seen = []
     for column, time_s in enumerate(motion.column_times_s.tolist()):
         reference_deg = motion.state_at(time_s + LEAD_S).angle_deg
@@ -46,9 +46,9 @@ def test_the_map_shows_the_forbidden_cells_where_they_are_and_the_paths_on_their
     drawn, axes = Drawn(figure), figure.axes[0]
     for location in range(configuration_map.location_count):
         for angle_deg in (60.0, 190.0, 205.0, 235.0, 250.0, 320.0, 345.0):
-            is_grey = np.ptp(drawn.colour(axes, location, angle_deg)) < 0.02
+            is_gray = np.ptp(drawn.color(axes, location, angle_deg)) < 0.02
             on_path = abs((run.run_input.plan.angles_deg[location] - angle_deg + 180.0) % 360.0 - 180.0) < 12.0
-            assert on_path or is_grey == configuration_map.is_allowed(location, angle_deg)
+            assert on_path or is_gray == configuration_map.is_allowed(location, angle_deg)
     columns, angles_deg = line(figure, 0, "planned")
     assert widths(figure, 0)["planned"] > 3.0 * widths(figure, 0)["executed (encoder)"]
     assert columns.tolist() == list(range(configuration_map.location_count))

@@ -8,7 +8,6 @@ import pytest
 from planner.execution.run_input import RunInput
 from planner.execution.run_record import Observation, Record
 from planner.execution.run_verification import RunVerification, verify_run
-from planner.execution.table_motion import TableMotion
 from planner.map.config_map import ConfigurationMap
 from tests.planner.run_examples import short_run_input
 
@@ -20,7 +19,7 @@ def run_input() -> RunInput:
 
 def checked(run_input: RunInput, off_deg: float, *, failure: str | None = None, source: str = "L") -> RunVerification:
     """Return the verification of a run that was `off_deg` from the plan throughout."""
-    motion = TableMotion(run_input.plan, run_input.problem.limits)
+    motion = run_input.motion()
     seen = [
         Observation(time_s, source, float(angle_deg) + off_deg, column if source == "L" else None)
         for column, (time_s, angle_deg) in enumerate(zip(motion.column_times_s, run_input.plan.angles_deg, strict=True))
@@ -64,7 +63,7 @@ def test_without_triggers_the_polled_positions_count(run_input: RunInput) -> Non
 
 
 def test_a_latch_of_an_earlier_trigger_does_not_count(run_input: RunInput) -> None:
-    motion = TableMotion(run_input.plan, run_input.problem.limits)
+    motion = run_input.motion()
     seen = [Observation(float(time_s), "L", 0.0, column) for column, time_s in enumerate(motion.column_times_s)]
     result = verify_run(run_input, motion, Record(observations=seen), lead_s=0.0)
     away = np.flatnonzero(np.abs(run_input.plan.angles_deg) > 1.0)
@@ -105,7 +104,7 @@ def test_the_margin_is_that_of_a_search_in_small_steps(seed: int, run_input: Run
 
 
 def test_the_margin_of_a_run_that_was_not_seen_is_unknown(run_input: RunInput) -> None:
-    motion = TableMotion(run_input.plan, run_input.problem.limits)
+    motion = run_input.motion()
     result = verify_run(run_input, motion, Record(), lead_s=0.0)
     assert np.isnan(result.margin_deg)
     assert not result.is_verified
@@ -116,7 +115,7 @@ def test_commands_sent_ahead_make_the_reference_early_and_the_encoder_less_late(
     run_input: RunInput, lead_s: float
 ) -> None:
     """A table made by hand: its reference is `lead_s` ahead of the plan's time, its encoder 20 ms behind that."""
-    lag_s, motion = 0.02, TableMotion(run_input.plan, run_input.problem.limits)
+    lag_s, motion = 0.02, run_input.motion()
     times_s = np.arange(0.1, motion.column_times_s[-1] - 0.1, 0.01)
     seen = [
         Observation(

@@ -14,8 +14,8 @@ from planner.execution.table_motion import TableMotion
 from planner.planning.plan import Plan
 from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
-from planner.table.velocity_profile import advance
 from planner.table.wire import StreamError, Wire
+from protocol.trapezoid import advance
 from tests.planner.run_examples import paused_run_input
 from tools.bench.stream import random_plan, stream_figures
 

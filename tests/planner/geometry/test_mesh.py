@@ -47,12 +47,12 @@ def test_a_sound_mesh_is_loaded_in_each_format(tmp_path: Path, suffix: str) -> N
 @pytest.mark.parametrize(
     ("mesh", "message"),
     [
-        (box(0.1), r"longest side is 0.1 mm; allowed is 10 to 1000 mm; is it in metres\?"),
-        (box(0.5), r"longest side is 0.5 mm; .* is it in metres or inches\?"),
-        (box(1.0), r"longest side is 1 mm; .* is it in metres or centimetres or inches\?"),
+        (box(0.1), r"longest side is 0.1 mm; allowed is 10 to 1000 mm; is it in meters\?"),
+        (box(0.5), r"longest side is 0.5 mm; .* is it in meters or inches\?"),
+        (box(1.0), r"longest side is 1 mm; .* is it in meters or centimeters or inches\?"),
         (
             box(8.0),
-            r"longest side is 8 mm; .* is it in centimetres or inches\? Then set unit in \[workpiece\], or --unit",
+            r"longest side is 8 mm; .* is it in centimeters or inches\? Then set unit in \[workpiece\], or --unit",
         ),
         (box(0.001), "allowed is 10 to 1000 mm$"),
         (box(5000.0), "longest side is 5000 mm; allowed is 10 to 1000 mm$"),

@@ -10,7 +10,7 @@ from planner.geometry.ray_casting import RayCaster
 
 
 def aimed_rays(count: int, radius_mm: float) -> tuple[FloatArray, FloatArray]:
-    """Return rays from all round a ball of that radius into its neighbourhood, some of which miss it."""
+    """Return rays from all round a ball of that radius into its neighborhood, some of which miss it."""
     rng = np.random.default_rng(3)
     origins = rng.normal(size=(count, 3))
     origins *= 4.0 * radius_mm / np.linalg.norm(origins, axis=1, keepdims=True)

@@ -9,7 +9,6 @@ from planner.geometry.transforms import (
     from_xyz_yaw_pitch_roll,
     nearest_rigid,
     rigid_inverse,
-    to_xyz_yaw_pitch_roll,
 )
 
 ANGLES = st.floats(-180.0, 180.0)
@@ -17,12 +16,11 @@ ANGLES = st.floats(-180.0, 180.0)
 
 @settings(max_examples=50)
 @given(yaw=ANGLES, pitch=st.one_of(st.sampled_from([0.0, 180.0]), st.floats(0.0, 180.0)), roll=ANGLES)
-def test_yaw_pitch_roll_is_zyz_and_comes_back(yaw: float, pitch: float, roll: float) -> None:
+def test_yaw_pitch_roll_is_zyz(yaw: float, pitch: float, roll: float) -> None:
     T = from_xyz_yaw_pitch_roll(np.array([[1.0, 2.0, 3.0, yaw, pitch, roll]]))
     expected = Rotation.from_euler("ZYZ", [yaw, pitch, roll], degrees=True).as_matrix()
     np.testing.assert_allclose(T[0, :3, :3], expected, atol=1e-12)
     np.testing.assert_allclose(T[0, :, 3], [1.0, 2.0, 3.0, 1.0])
-    np.testing.assert_allclose(from_xyz_yaw_pitch_roll(to_xyz_yaw_pitch_roll(T)), T, atol=1e-9)
 
 
 def test_the_rigid_inverse_is_the_inverse() -> None:

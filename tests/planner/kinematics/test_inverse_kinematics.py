@@ -60,10 +60,10 @@ def angle_between(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def away_from_singularities(arm: Arm, joints: FloatArray) -> npt.NDArray[np.bool_]:
     """True for joints whose wrist, elbow and shoulder are each a little off the place where solutions meet."""
-    wrist_centre = arm.link_frames(joints)[:, 4, :3, 3]
+    wrist_center = arm.link_frames(joints)[:, 4, :3, 3]
     sense = -np.sign(arm.alpha_deg[0])
     elbow = sense * joints[:, 2] - np.arctan2(arm.d_mm[3], arm.a_mm[2])
-    off_axis_1 = np.hypot(wrist_centre[:, 0], wrist_centre[:, 1]) - abs(arm.d_mm[1] + arm.d_mm[2])
+    off_axis_1 = np.hypot(wrist_center[:, 0], wrist_center[:, 1]) - abs(arm.d_mm[1] + arm.d_mm[2])
     sines = np.abs(np.sin([joints[:, 4], elbow]))
     return np.asarray((sines > 1e-4).all(axis=0) & (off_axis_1 > 0.1))
 

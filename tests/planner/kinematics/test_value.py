@@ -22,7 +22,7 @@ from planner.kinematics.value import (
     joints_value,
     wrist_factor,
 )
-from planner.toml_table import TomlTable
+from protocol.toml_table import TomlTable
 
 DEFAULT = ValueFunction()
 
@@ -142,7 +142,7 @@ def test_a_value_function_that_cannot_be_meant_is_refused(wrong: Callable[[], Va
 def table(text: str, tmp_path: Path) -> TomlTable:
     file = tmp_path / "scan.toml"
     file.write_text(text)
-    return TomlTable.load(file)
+    return TomlTable.load(file, ScanFileError)
 
 
 def test_an_empty_table_gives_the_defaults(tmp_path: Path) -> None:

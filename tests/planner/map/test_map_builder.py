@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from planner.cell.clearance import clearances
+from planner.cell.pose_clearance import clearances
 from planner.cell.scan import load_scan
 from planner.geometry.transforms import rotations_z
 from planner.kinematics.configuration import Configuration
@@ -20,6 +20,7 @@ from planner.map.map_builder import build_maps
 from planner.map.map_problem import MapProblem, map_problem
 from planner.map.map_reasons import FIRST_PAIR, FIRST_USER_FACTOR
 from planner.reasons import Reason
+from tests.planner.goals import goal_flange_poses
 
 Array = NDArray[np.float64]
 
@@ -48,7 +49,7 @@ def mould(count: int = 24) -> MapProblem:
 def slow_cell(problem: MapProblem, location: int, angle_deg: float, slot: Configuration) -> tuple[float, int]:
     """Return f_R and the reason of one cell, step by step as the paper's section 3 has them."""
     cell, value = problem.cell, problem.value
-    goal = cell.goal_flange_poses(problem.T_WS[[location]], np.array([angle_deg]))[0]
+    goal = goal_flange_poses(cell, problem.T_WS[[location]], np.array([angle_deg]))[0]
     joints, reasons = inverse_kinematics(cell.arm, goal)
     joints, reason = joints[0, slot], int(reasons[0, slot])
     if reason != Reason.REACHED:

@@ -8,7 +8,7 @@ from matplotlib.image import imread
 
 from planner.map import map_plots
 from planner.map.config_map import ConfigurationMap
-from planner.map.map_colours import DARKEST_GRAY, coloured
+from planner.map.map_colors import DARKEST_GRAY, colored
 from planner.map.map_plots import map_figure, plot_map, plot_map_cylinder
 from planner.map.map_reasons import FIRST_PAIR, reason_texts
 from planner.planning.plan import make_plan
@@ -34,7 +34,7 @@ def a_map() -> ConfigurationMap:
 
 
 def test_allowed_cells_are_gray_and_forbidden_ones_are_not() -> None:
-    image, _ = coloured(a_map())
+    image, _ = colored(a_map())
     allowed = a_map().allowed.T
     spread = image.max(axis=2) - image.min(axis=2)
     assert (spread[allowed] == 0.0).all()
@@ -43,12 +43,12 @@ def test_allowed_cells_are_gray_and_forbidden_ones_are_not() -> None:
 
 
 def test_the_legend_names_each_reason_once_with_its_share_the_most_frequent_first() -> None:
-    _, legend = coloured(a_map())
+    _, legend = colored(a_map())
     shares = [entry.share for entry in legend]
     assert sum(shares) == pytest.approx((~a_map().allowed).mean())
     assert legend[0].text == "out of reach"
     assert "joint 3 limit" in [entry.text for entry in legend]
-    assert len({entry.colour for entry in legend}) == len(legend)
+    assert len({entry.color for entry in legend}) == len(legend)
     assert legend[-1].text == "other collisions"
 
 
@@ -86,10 +86,10 @@ def test_a_plan_lies_on_the_map_in_the_colors_of_its_reasons() -> None:
     problem = Problem(shown)
     figure = plan_figure(problem, make_plan(problem, "test", np.full(40, 340.0), np.zeros(40), np.zeros(39)), "")
     drawn, axes = Drawn(figure), figure.axes[0]
-    image, legend = coloured(shown)
+    image, legend = colored(shown)
     for location in range(1, 40):
         for sample in range(1, 32):
-            assert drawn.colour(axes, location, sample * 10.0) == pytest.approx(image[sample, location], abs=0.02)
+            assert drawn.color(axes, location, sample * 10.0) == pytest.approx(image[sample, location], abs=0.02)
     named = [text.get_text() for text in figure.legends[0].get_texts()]
     assert [text.rpartition(" (")[0] for text in named] == [entry.text for entry in legend]
 
@@ -110,18 +110,18 @@ def test_a_cell_is_drawn_at_its_location_and_angle(
     assert axes.get_ylabel().startswith("table angle")
     for location in range(12):
         for sample in range(1, 20):  # the path of the plan lies at 0
-            bright = drawn.colour(axes, location, sample * 18.0).mean()
+            bright = drawn.color(axes, location, sample * 18.0).mean()
             assert (bright > 0.5) == bool(shown.allowed[location, sample])
 
 
 def test_the_tube_shows_each_angle_in_its_row_and_each_location_in_its_column() -> None:
-    image = coloured(scattered_map())[0]
-    for centre_deg in (0.0, 180.0):
-        tube = map_plots._tube(image, centre_deg, 700, 260)  # noqa: SLF001 - the picture without its axes
+    image = colored(scattered_map())[0]
+    for center_deg in (0.0, 180.0):
+        tube = map_plots._tube(image, center_deg, 700, 260)  # noqa: SLF001 - the picture without its axes
         for offset_deg in (-72.0, -36.0, 0.0, 36.0, 72.0):
             y, z = np.sin(np.radians(offset_deg)), np.cos(np.radians(offset_deg))
             row = int((y + 1.0) / 2.0 * 260)
-            sample = round((centre_deg + offset_deg) / 18.0) % 20
+            sample = round((center_deg + offset_deg) / 18.0) % 20
             for location in range(12):
                 # The tube is 4 radii long; its near side is drawn bulged to the left by 0.3 of the depth.
                 x = 4.0 * (location + 0.5) / 12.0 - 0.3 * z

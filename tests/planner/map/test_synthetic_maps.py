@@ -29,7 +29,7 @@ def test_a_slope_lets_the_pattern_drift() -> None:
     assert np.array_equal(np.roll(still.values[30], 30), drifting.values[30])
 
 
-def test_blocks_are_black_with_a_grey_border() -> None:
+def test_blocks_are_black_with_a_gray_border() -> None:
     values = blocks_map(20, 40, [(5, 8, 10, 14)], edge=2).values
     assert not values[5:9, 10:15].any()
     assert 0.0 < values[6, 15] < values[6, 16] < values[6, 17] == 1.0

@@ -13,6 +13,7 @@ from planner.planning.arm_on_path import arm_on_path
 from planner.planning.plan import Plan
 from planner.planning.rotate_when_blocked import rotate_when_blocked
 from planner.planning.scan_problem import scan_problem
+from tests.planner.goals import goal_flange_poses
 
 CONFIGURATION = Configuration.LEFTY_ABOVE_NOFLIP
 
@@ -34,7 +35,7 @@ def plan(scan: Scan) -> Plan:
 
 def test_the_joints_put_the_probe_where_the_plan_says(scan: Scan, plan: Plan) -> None:
     motion = arm_motion(arm_on_path(scan, CONFIGURATION), plan)
-    poses = scan.cell.goal_flange_poses(scan.path.T_WS, plan.angles_deg)
+    poses = goal_flange_poses(scan.cell, scan.path.T_WS, plan.angles_deg)
     each = np.arange(scan.path.count)
     expected = inverse_kinematics(scan.cell.arm, poses[each, each])[0][:, CONFIGURATION]
     assert np.cos(motion.joints - expected) == pytest.approx(1.0, abs=1e-12)

@@ -231,8 +231,8 @@ def test_a_free_start_costs_no_more_than_any_given_one() -> None:
 def test_a_corridor_that_drifts_faster_than_the_table_turns_is_unreachable_and_says_where() -> None:
     values = np.zeros((20, 60))
     for k in range(20):
-        centre = 5 if k < 10 else 5 + 3 * (k - 9)
-        values[k, [(centre + offset) % 60 for offset in range(-3, 4)]] = 1.0
+        center = 5 if k < 10 else 5 + 3 * (k - 9)
+        values[k, [(center + offset) % 60 for offset in range(-3, 4)]] = 1.0
     outcome = dynamic_programming(Problem(ConfigurationMap(values), step_s=0.1))
     assert isinstance(outcome, NoPlan)
     assert outcome.infeasibility is Infeasibility.UNREACHABLE

@@ -36,11 +36,16 @@ def test_a_plan_comes_back_as_it_was(scan: Scan, tmp_path: Path) -> None:
     save_plan(
         tmp_path / "plan.json", plan_document(scan, problem, plan, arm_motion(arm_on_path(scan, CONFIGURATION), plan))
     )
-    loaded = load_plan(tmp_path / "plan.json")
+    stored = load_plan(tmp_path / "plan.json")
+    loaded = stored.plan
     for name in ("angles_deg", "speeds_deg_s", "accelerations_deg_s2"):
         assert np.array_equal(getattr(loaded, name), getattr(plan, name))
     assert (loaded.planner, loaded.configuration, loaded.step_s) == ("still", CONFIGURATION.label, plan.step_s)
     assert (loaded.cost, loaded.pauses) == (plan.cost, plan.pauses)
+    assert (stored.scan, stored.limits) == (scan.name, problem.limits)
+    assert stored.arm_fault == "out of reach at location 4"  # the table stays where it is
+    np.testing.assert_allclose(stored.arm.T_WS, scan.path.T_WS, atol=1e-8)
+    assert stored.arm.cell.arm == scan.cell.arm
     assert [file.name for file in tmp_path.iterdir()] == ["plan.json"]
 
 

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from planner.cell.cell import Cell, placement
 from planner.geometry.transforms import rigid_inverse
 from planner.scanning.alignment import Calibration, aligned, probe_poses
+from tests.planner.goals import goal_flange_poses
 
 lengths = st.floats(-500.0, 500.0)
 angles = st.floats(-720.0, 720.0)
@@ -18,7 +19,7 @@ def test_alignment_undoes_the_way_to_the_goal(
 ) -> None:
     cell = Cell(T_BT=table, T_TW=workpiece, T_FS=probe)
     theta = np.array([theta_deg])
-    goal = cell.goal_flange_poses(location[np.newaxis], theta)[0]
+    goal = goal_flange_poses(cell, location[np.newaxis], theta)[0]
     assert np.abs(probe_poses(Calibration.of(cell), goal, theta)[0] - location).max() < 1e-9
 
 

@@ -16,11 +16,11 @@ from planner.scanning.calibration import (
 from planner.scanning.probe import LaserProbe
 from planner.scanning.probe_calibration import calibrate_probe, cube_turns
 from planner.scanning.reference_sphere import calibrate_cell, profile_of_sphere, views_of
-from planner.scanning.sphere_fit import fit_sphere, sphere_centre
+from planner.scanning.sphere_fit import fit_sphere
 from tools.bench.calibration import AXIS_TRIALS, PROBE_TRIALS
 
 TRUE = Calibration.of(Cell())
-CENTRE = np.array([450.0, 120.0, 260.0])
+CENTER = np.array([450.0, 120.0, 260.0])
 RADIUS_MM = 15.0
 
 
@@ -63,7 +63,7 @@ def test_both_calibrations_find_the_cell_within_what_they_promise(seed: int) -> 
 def seen_from(T_FS: FloatArray, views: FloatArray, noise_mm: float = 0.025) -> tuple[FloatArray, list[FloatArray]]:
     rng = np.random.default_rng(1)
     probe = LaserProbe(noise_mm=noise_mm, points_per_line=160)
-    return views @ rigid_inverse(T_FS), [profile_of_sphere(probe, T, CENTRE, RADIUS_MM, rng) for T in views]
+    return views @ rigid_inverse(T_FS), [profile_of_sphere(probe, T, CENTER, RADIUS_MM, rng) for T in views]
 
 
 def swept(views: FloatArray) -> FloatArray:
@@ -72,7 +72,7 @@ def swept(views: FloatArray) -> FloatArray:
 
 
 def test_a_false_minimum_is_met_and_not_taken() -> None:
-    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8, LaserProbe())))
+    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTER, 8, LaserProbe())))
     wrong_starts = 0
     for turned in list(cube_turns(TRUE.T_FS))[::5]:
         found = calibrate_probe(T_BF, points, RADIUS_MM, turned)
@@ -83,7 +83,7 @@ def test_a_false_minimum_is_met_and_not_taken() -> None:
 
 
 def test_without_noise_the_fit_is_exact() -> None:
-    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8, LaserProbe())), noise_mm=0.0)
+    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTER, 8, LaserProbe())), noise_mm=0.0)
     assert off(calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS).T_FS, TRUE.T_FS) == pytest.approx((0, 0), abs=1e-6)
 
 
@@ -95,64 +95,64 @@ def test_the_24_turns_of_a_cube_are_different_and_proper() -> None:
 
 
 def moved_sphere() -> object:
-    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8, LaserProbe())))
+    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTER, 8, LaserProbe())))
     T_BF[10:, 0, 3] += 0.7
     return calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
 
 
 def another_sphere() -> object:
-    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8, LaserProbe())))
+    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTER, 8, LaserProbe())))
     return calibrate_probe(T_BF, points, 12.7, TRUE.T_FS)
 
 
 def always_in_the_middle() -> object:
-    views = views_of(CENTRE, 8, LaserProbe())
+    views = views_of(CENTER, 8, LaserProbe())
     beams = views[:, :3, 2]
-    views[:, :3, 3] = CENTRE - 165.0 * beams
+    views[:, :3, 3] = CENTER - 165.0 * beams
     T_BF, points = seen_from(TRUE.T_FS, swept(views))
     return calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
 
 
 def always_the_same_direction() -> object:
-    one = views_of(CENTRE, 8, LaserProbe())[:1]
+    one = views_of(CENTER, 8, LaserProbe())[:1]
     T_BF, points = seen_from(TRUE.T_FS, swept(np.repeat(one, 3, axis=0)))
     return calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
 
 
 def always_on_the_same_side() -> object:
-    beside = views_of(CENTRE, 10, LaserProbe()) @ placement(0.0, -9.0, 0.0, 0.0, 0.0, 0.0)
+    beside = views_of(CENTER, 10, LaserProbe()) @ placement(0.0, -9.0, 0.0, 0.0, 0.0, 0.0)
     T_BF, points = seen_from(TRUE.T_FS, beside)
     return calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
 
 
-def radius_in_metres() -> object:
-    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8, LaserProbe())))
+def radius_in_meters() -> object:
+    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTER, 8, LaserProbe())))
     return calibrate_probe(T_BF, points, 0.001 * RADIUS_MM, TRUE.T_FS)
 
 
-def points_in_metres() -> object:
-    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8, LaserProbe())))
+def points_in_meters() -> object:
+    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTER, 8, LaserProbe())))
     return calibrate_probe(T_BF, [0.001 * view for view in points], RADIUS_MM, TRUE.T_FS)
 
 
 def noise_larger_than_given() -> object:
-    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8, LaserProbe())), noise_mm=0.03)
+    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTER, 8, LaserProbe())), noise_mm=0.03)
     return calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS, noise_mm=0.025)
 
 
 def a_pose_that_is_nan() -> object:
-    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTRE, 8, LaserProbe())))
+    T_BF, points = seen_from(TRUE.T_FS, swept(views_of(CENTER, 8, LaserProbe())))
     T_BF[3, 0, 3] = np.nan
     return calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
 
 
 def too_few_views() -> object:
-    T_BF, points = seen_from(TRUE.T_FS, views_of(CENTRE, 5, LaserProbe()))
+    T_BF, points = seen_from(TRUE.T_FS, views_of(CENTER, 5, LaserProbe()))
     return calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
 
 
 def an_empty_view() -> object:
-    T_BF, points = seen_from(TRUE.T_FS, views_of(CENTRE, 8, LaserProbe()))
+    T_BF, points = seen_from(TRUE.T_FS, views_of(CENTER, 8, LaserProbe()))
     points[3] = points[3][:2]
     return calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
 
@@ -163,8 +163,8 @@ def an_empty_view() -> object:
         (moved_sphere, r"mm \(rms\) off one sphere .* elsewhere from view 11 on: did it move"),
         (another_sphere, r"mm \(rms\) off one sphere .* fit one of 15.0.. mm better: is this the sphere"),
         (always_on_the_same_side, r"fit two places of the probe equally well, 1[78]\.. mm apart"),
-        (radius_in_metres, "must all be in mm"),
-        (points_in_metres, "must all be in mm"),
+        (radius_in_meters, "must all be in mm"),
+        (points_in_meters, "must all be in mm"),
         (noise_larger_than_given, "1.2. times the probe's noise"),
         (a_pose_that_is_nan, "not a finite number"),
         (always_in_the_middle, "fit two places of the probe equally well, 180 deg apart"),
@@ -181,7 +181,7 @@ def test_views_that_do_not_determine_the_probes_place_are_refused(views: Callabl
 @pytest.mark.parametrize(("beside_mm", "count"), [(-4.0, 8), (8.0, 14)])
 def test_the_place_beyond_the_lasers_plane_is_looked_at_as_well(beside_mm: float, count: int) -> None:
     """All turns of the probe lead to the true place here: only the fit that begins beyond the plane finds the other."""
-    beside = views_of(CENTRE, count, LaserProbe()) @ placement(0.0, beside_mm, 0.0, 0.0, 0.0, 0.0)
+    beside = views_of(CENTER, count, LaserProbe()) @ placement(0.0, beside_mm, 0.0, 0.0, 0.0, 0.0)
     T_BF, points = seen_from(TRUE.T_FS, beside)
     with pytest.raises(CalibrationError, match=r"fit two places of the probe equally well, .* mm apart"):
         calibrate_probe(T_BF, points, RADIUS_MM, TRUE.T_FS)
@@ -203,24 +203,24 @@ def test_bad_measurements_are_refused_and_the_stated_uncertainty_is_that_of_clea
             assert max(errors) < 4.0
 
 
-def test_one_profile_has_two_centres_and_neither_is_taken() -> None:
-    T_BS = views_of(CENTRE, 8, LaserProbe())[2] @ placement(0.0, 6.0, 0.0, 0.0, 0.0, 0.0)
-    profile = profile_of_sphere(LaserProbe(), T_BS, CENTRE, RADIUS_MM, np.random.default_rng(0))
+def test_one_profile_has_two_centers_and_neither_is_taken() -> None:
+    T_BS = views_of(CENTER, 8, LaserProbe())[2] @ placement(0.0, 6.0, 0.0, 0.0, 0.0, 0.0)
+    profile = profile_of_sphere(LaserProbe(), T_BS, CENTER, RADIUS_MM, np.random.default_rng(0))
     points = profile @ T_BS[:3, :3].T + T_BS[:3, 3]
-    with pytest.raises(CalibrationError, match=r"lie in one plane; centres at \(.*\) and \(.*\) mm fit equally well"):
-        sphere_centre(points, RADIUS_MM)
+    with pytest.raises(CalibrationError, match=r"lie in one plane; centers at \(.*\) and \(.*\) mm fit equally well"):
+        fit_sphere(points, RADIUS_MM)
     with pytest.raises(CalibrationError, match="at least 4 points"):
-        sphere_centre(points[:3], RADIUS_MM)
+        fit_sphere(points[:3], RADIUS_MM)
 
 
-def test_the_deviation_of_a_centre_is_that_of_repeated_measurements() -> None:
+def test_the_deviation_of_a_center_is_that_of_repeated_measurements() -> None:
     probe, rng = LaserProbe(points_per_line=160), np.random.default_rng(3)
-    poses = swept(views_of(CENTRE, 2, probe))
+    poses = swept(views_of(CENTER, 2, probe))
     found = []
     for _ in range(60):
-        profiles = [profile_of_sphere(probe, T, CENTRE, RADIUS_MM, rng) @ T[:3, :3].T + T[:3, 3] for T in poses]
+        profiles = [profile_of_sphere(probe, T, CENTER, RADIUS_MM, rng) @ T[:3, :3].T + T[:3, 3] for T in poses]
         found.append(fit_sphere(np.concatenate(profiles), RADIUS_MM, probe.noise_mm))
-    scatter = np.std([each.centre for each in found], axis=0)
+    scatter = np.std([each.center for each in found], axis=0)
     # Noise along the ray shows less across the surface, so that the deviation given is never too small.
     assert (scatter < 1.2 * found[0].deviations_mm).all()
     assert (scatter > 0.5 * found[0].deviations_mm).all()
@@ -229,7 +229,7 @@ def test_the_deviation_of_a_centre_is_that_of_repeated_measurements() -> None:
 ANGLES_DEG: FloatArray = np.arange(8) * np.float64(45.0)
 
 
-def centres(angles_deg: FloatArray = ANGLES_DEG, radius_mm: float = 120.0) -> FloatArray:
+def centers(angles_deg: FloatArray = ANGLES_DEG, radius_mm: float = 120.0) -> FloatArray:
     on_table = np.array([radius_mm, 0.0, 60.0, 1.0])
     return np.asarray((TRUE.T_BT @ rotations_z(angles_deg) @ on_table)[:, :3])
 
@@ -240,7 +240,7 @@ CLOSE_DEG: FloatArray = np.array([0.0, 12.0, 120.0, 132.0])
 
 
 def noisy(angles_deg: FloatArray, noise_mm: float, moved_mm: float = 0.0) -> FloatArray:
-    found = centres(angles_deg) + np.random.default_rng(0).normal(0.0, noise_mm, (len(angles_deg), 3))
+    found = centers(angles_deg) + np.random.default_rng(0).normal(0.0, noise_mm, (len(angles_deg), 3))
     found[len(angles_deg) // 2 :, 2] += moved_mm
     return found
 
@@ -258,14 +258,14 @@ def test_the_axis_error_allowed_is_that_at_the_edge_of_the_part() -> None:
 
 def test_an_exact_circle_gives_the_exact_axis_from_a_poor_nominal() -> None:
     nominal = TRUE.T_BT @ placement(4.0, -3.0, 0.0, 0.0, 5.0, 0.0)
-    found = calibrate_table_axis(centres(), ANGLES_DEG, nominal)
+    found = calibrate_table_axis(centers(), ANGLES_DEG, nominal)
     assert found.T_BT[:3, 2] == pytest.approx(TRUE.T_BT[:3, 2], abs=1e-9)
     assert np.hypot(*(rigid_inverse(TRUE.T_BT) @ found.T_BT)[:2, 3]) < 1e-6
     assert found.rms_mm < 1e-6
 
 
-def test_the_residual_is_that_of_the_centres() -> None:
-    noisy = centres() + np.random.default_rng(0).normal(0.0, 0.01, (8, 3))
+def test_the_residual_is_that_of_the_centers() -> None:
+    noisy = centers() + np.random.default_rng(0).normal(0.0, 0.01, (8, 3))
     found = calibrate_table_axis(noisy, ANGLES_DEG, TRUE.T_BT)
     # 24 coordinates less 7 unknowns.
     assert found.rms_mm == pytest.approx(0.01 * np.sqrt(17.0 / 8.0), rel=0.5)
@@ -273,44 +273,44 @@ def test_the_residual_is_that_of_the_centres() -> None:
 
 
 @pytest.mark.parametrize(
-    ("centres_B", "angles_deg", "message"),
+    ("centers_B", "angles_deg", "message"),
     [
-        (centres()[:3], ANGLES_DEG[:3], "3 sphere centres and 3 table angles; .* at least 4"),
-        (centres(REPEATED_DEG), REPEATED_DEG, "the 8 table angles are only 2 distinct places; .* at least 4"),
-        (centres(WRAPPED_DEG), WRAPPED_DEG, "the 5 table angles are only 3 distinct places"),
+        (centers()[:3], ANGLES_DEG[:3], "3 sphere centers and 3 table angles; .* at least 4"),
+        (centers(REPEATED_DEG), REPEATED_DEG, "the 8 table angles are only 2 distinct places; .* at least 4"),
+        (centers(WRAPPED_DEG), WRAPPED_DEG, "the 5 table angles are only 3 distinct places"),
         (noisy(CLOSE_DEG, 0.05), CLOSE_DEG, r"axis open by .* mm and .* deg .* 150 mm radius .* allowed are 0.1 mm"),
-        (noisy(ANGLES_DEG, 0.02, 1.0), ANGLES_DEG, "elsewhere from centre 5 on: did it move on the table"),
-        (centres()[:5], ANGLES_DEG, "5 sphere centres and 8 table angles"),
-        (centres(ANGLES_DEG / 8.0), ANGLES_DEG / 8.0, "span only 39 deg"),
-        (centres(radius_mm=5.0), ANGLES_DEG, "only 5.0 mm radius"),
-        (centres(), -ANGLES_DEG, "off the nominal one"),
-        (centres() * np.nan, ANGLES_DEG, "not a finite number"),
-        (centres() + np.eye(8, 3) * 2.0, ANGLES_DEG, r"mm \(rms\) off a turning table's circle"),
+        (noisy(ANGLES_DEG, 0.02, 1.0), ANGLES_DEG, "elsewhere from center 5 on: did it move on the table"),
+        (centers()[:5], ANGLES_DEG, "5 sphere centers and 8 table angles"),
+        (centers(ANGLES_DEG / 8.0), ANGLES_DEG / 8.0, "span only 39 deg"),
+        (centers(radius_mm=5.0), ANGLES_DEG, "only 5.0 mm radius"),
+        (centers(), -ANGLES_DEG, "off the nominal one"),
+        (centers() * np.nan, ANGLES_DEG, "not a finite number"),
+        (centers() + np.eye(8, 3) * 2.0, ANGLES_DEG, r"mm \(rms\) off a turning table's circle"),
     ],
 )
-def test_centres_that_do_not_determine_an_axis_are_refused(
-    centres_B: FloatArray, angles_deg: FloatArray, message: str
+def test_centers_that_do_not_determine_an_axis_are_refused(
+    centers_B: FloatArray, angles_deg: FloatArray, message: str
 ) -> None:
     with pytest.raises(CalibrationError, match=message):
-        calibrate_table_axis(centres_B, angles_deg, TRUE.T_BT)
+        calibrate_table_axis(centers_B, angles_deg, TRUE.T_BT)
 
 
 @pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan, np.inf])
 def test_a_noise_or_radius_that_cannot_be_is_refused(wrong: float) -> None:
-    views = seen_from(TRUE.T_FS, views_of(CENTRE, 8, LaserProbe()))
+    views = seen_from(TRUE.T_FS, views_of(CENTER, 8, LaserProbe()))
     with pytest.raises(CalibrationError, match=r"noise is .* finite number above 0"):
-        calibrate_table_axis(centres(), ANGLES_DEG, TRUE.T_BT, noise_mm=wrong)
+        calibrate_table_axis(centers(), ANGLES_DEG, TRUE.T_BT, noise_mm=wrong)
     with pytest.raises(CalibrationError, match=r"noise is .* finite number above 0"):
         calibrate_probe(*views, RADIUS_MM, TRUE.T_FS, noise_mm=wrong)
     with pytest.raises(CalibrationError, match="must all be in mm"):
         calibrate_probe(*views, wrong, TRUE.T_FS)
     with pytest.raises(CalibrationError, match=r"radius is .* finite number above 0"):
-        sphere_centre(centres(), wrong)
+        fit_sphere(centers(), wrong)
 
 
-def test_a_centre_is_found_from_a_part_of_the_sphere() -> None:
+def test_a_center_is_found_from_a_part_of_the_sphere() -> None:
     rng = np.random.default_rng(2)
     normals = rng.normal(size=(400, 3))
     normals[:, 2] = np.abs(normals[:, 2])
-    points = CENTRE + RADIUS_MM * normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    assert np.abs(sphere_centre(points, RADIUS_MM) - CENTRE).max() < 1e-6
+    points = CENTER + RADIUS_MM * normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    assert np.abs(fit_sphere(points, RADIUS_MM).center - CENTER).max() < 1e-6

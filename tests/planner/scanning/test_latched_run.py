@@ -10,7 +10,7 @@ from planner.scanning.latching import Drop
 from planner.scanning.trigger_line import ProbeByHand, TriggerFaults
 from planner.table.wire import Wire
 from protocol import Clock, TableClient
-from protocol.bench import InsideView, TableStatus
+from protocol.bench import GroundTruth, TableStatus
 from tests.planner.latched import LIMITS, joints_along, latched_run, swinging_plan, table_behind
 
 
@@ -131,7 +131,7 @@ def test_profiles_are_taken_on_the_path_only(sound: LatchedRun) -> None:
 class SlowView:
     """A view into a table through which the first look takes long."""
 
-    def __init__(self, table: InsideView, clock: Clock, first_look_s: float) -> None:
+    def __init__(self, table: GroundTruth, clock: Clock, first_look_s: float) -> None:
         self.trigger = table.trigger
         self._table, self._clock, self._delay_s = table, clock, first_look_s
 

@@ -69,7 +69,7 @@ def test_an_empty_cloud_is_a_sound_file(tmp_path: Path) -> None:
     assert len(properties(tmp_path / "cloud.ply")) == 0
 
 
-def test_text_keeps_a_tenth_of_a_micrometre(tmp_path: Path) -> None:
+def test_text_keeps_a_tenth_of_a_micrometer(tmp_path: Path) -> None:
     with XyzWriter(tmp_path / "cloud.xyz") as xyz:
         xyz.write(POINTS[:600])
         xyz.write(POINTS[600:])

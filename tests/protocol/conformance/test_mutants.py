@@ -10,7 +10,7 @@ import pytest
 from emulator.config.table_config import load_config
 from protocol.conformance.bench.stand import STRICT, InProcess
 from protocol.conformance.bench.wire import RecordedPort
-from protocol.conformance.cases.catalogue import all_cases, chosen_cases
+from protocol.conformance.cases.catalog import all_cases, chosen_cases
 from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import load_profile
 from protocol.conformance.session.suite import Outcome, Session, SessionError

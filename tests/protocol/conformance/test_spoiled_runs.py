@@ -10,7 +10,7 @@ from protocol.conformance.bench.stand import InProcess
 from protocol.conformance.bench.wire import RecordedPort
 from protocol.conformance.cases import serial_line
 from protocol.conformance.cases.case import Case
-from protocol.conformance.cases.catalogue import chosen_cases
+from protocol.conformance.cases.catalog import chosen_cases
 from protocol.conformance.judgement.rig import Rig
 from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import load_profile

@@ -1,13 +1,26 @@
 """A small share of what the benchmark measures, as tests."""
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 import pytest
 
+from planner.arrays import FloatArray
 from planner.execution.execute import Settings
-from planner.execution.stream import rounded_stream, stream
+from planner.execution.stream import TimedCommand, reference_states, rounded_stream, stream
+from planner.execution.table_motion import TableMotion
+from planner.planning.plan import Plan
 from planner.table.motion import Limits
-from tools.bench.stream import LEAD_S, errors_at_locations, random_plan
+from planner.table.wire import Wire
+from tools.bench.stream import LEAD_S, random_plan
 from tools.bench.virtual_run import random_run_inputs, run_in_virtual_time
+
+
+def errors_at_locations(plan: Plan, limits: Limits, streamed: Callable[..., Sequence[TimedCommand]]) -> FloatArray:
+    """Return how far the reference is from a plan at each location, by the controller's own rules."""
+    motion = TableMotion(plan, limits)
+    states = reference_states(streamed(motion, limits, Wire()), motion.column_times_s)
+    return np.array([state.angle_deg for state in states]) - plan.angles_deg
 
 
 def test_a_random_plan_keeps_the_limits() -> None:

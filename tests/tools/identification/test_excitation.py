@@ -11,7 +11,7 @@ from tools.identification.excitation import Burst, excitation
 
 
 @pytest.mark.parametrize("index", range(14))
-def test_the_firmware_runs_a_burst_as_foretold_whenever_in_the_braking_the_targets_come(
+def test_the_firmware_runs_a_burst_as_predicted_whenever_in_the_braking_the_targets_come(
     index: int, assumed: TableConfig
 ) -> None:
     burst = excitation(60.0, 40.0, 100.0, seed=0)[index]
@@ -19,9 +19,9 @@ def test_the_firmware_runs_a_burst_as_foretold_whenever_in_the_braking_the_targe
 
     answer = emulate(assumed, motions(burst, chance), burst.duration_s)
 
-    foretold = [burst.reference(time_s) for time_s in answer.time_s]
-    np.testing.assert_allclose(answer.reference_deg, [each.angle_deg for each in foretold], atol=0.02)
-    np.testing.assert_allclose(answer.reference_speed_deg_s, [each.speed_deg_s for each in foretold], atol=0.2)
+    predicted = [burst.reference(time_s) for time_s in answer.time_s]
+    np.testing.assert_allclose(answer.reference_deg, [each.angle_deg for each in predicted], atol=0.02)
+    np.testing.assert_allclose(answer.reference_speed_deg_s, [each.speed_deg_s for each in predicted], atol=0.2)
 
 
 def motions(burst: Burst, chance: Random) -> list[Motion]:

@@ -5,7 +5,7 @@ import pytest
 import emulator  # noqa: F401  # teaches pyserial the port emulator://
 from emulator.config.table_config import TableConfig, load_config
 from protocol.client import TableClient
-from tools.bench.identify_tables import write_plant
+from tools.bench.identify_tables import random_plant, write_constants
 from tools.emulated import Motion, emulate
 from tools.identification.constants import Constant, coulomb_Nm
 from tools.identification.excitation import excitation
@@ -39,7 +39,9 @@ def test_a_minute_over_the_wire_tells_the_constants_of_a_table_that_it_has_not_s
 
 
 def test_a_long_ridge_is_followed_to_its_top(assumed: TableConfig, tmp_path: Path) -> None:
-    plant = write_plant(tmp_path, seed=23)  # climbing by slopes alone stops there with a third of the friction missing
+    plant = write_constants(
+        tmp_path / "table.toml", random_plant(23)
+    )  # climbing by slopes alone stops there with a third of the friction missing
     with TableClient.open(f"emulator://?config={plant}&seed=23") as client:
         recorded = record(client, excitation(60.0, 40.0, 100.0, seed=0), speed_deg_s=40.0, baud=9600)
 

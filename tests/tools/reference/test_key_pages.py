@@ -12,8 +12,8 @@ from emulator.config.table_config import load_config
 from emulator.faults.fault import KINDS, parameters_of
 from planner.cell.cell import Table
 from planner.cell.workpiece import CLASSES
-from planner.toml_table import TomlTable
 from protocol.conformance.profile.profile import load_profile
+from protocol.toml_table import TomlTable
 from tools.reference.keys import Key, comments, key_page
 from tools.reference.planner_keys import arm_keys, bodies_keys, scan_keys
 from tools.reference.profile_keys import profile_keys
@@ -104,7 +104,7 @@ def test_each_key_of_a_profile_has_its_row() -> None:
 
 def test_what_a_key_of_a_profile_may_be_comes_from_its_refusals() -> None:
     allowed = {key.name: key.allowed for key in profile_keys()}
-    assert allowed["serial.decimals"] == "a whole number from 0 up; 1 to 6"
+    assert allowed["serial.decimals"] == "a whole number from 1 to 6"
     assert allowed["serial.error_replies"] == "true or false"
     assert "at most limits.speed_deg_s, 40" in allowed["motion.speed_deg_s"]
 

@@ -60,7 +60,7 @@ def test_a_namespace_folder_tools_is_imported_beside_ours(tmp_path: Path) -> Non
     test = (
         "import tools.mine, tools.command_line\n\n"
         "def test_both_are_there():\n"
-        "    assert tools.mine.NAME == 'mine' and tools.command_line.ended\n"
+        "    assert tools.mine.NAME == 'mine' and tools.command_line.check_folder\n"
     )
     result = run_pytest(project(tmp_path, {"tools/mine.py": "NAME = 'mine'\n", "test_mine.py": test}))
     assert "1 passed" in result.stdout, result.stdout + result.stderr

@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from protocol.conformance.cases.catalogue import all_cases
+from protocol.conformance.cases.catalog import all_cases
 
 ROOT = Path(__file__).parents[3]
 

@@ -17,7 +17,7 @@ FIGURES = [figure for check in CHECKS for figure in check.figures]
 @pytest.mark.parametrize(
     "figure", [figure for figure in FIGURES if figure.model is not None], ids=lambda each: each.key
 )
-def test_the_emulator_does_what_the_linear_model_foretells(figure: Figure) -> None:
+def test_the_emulator_does_what_the_linear_model_predicts(figure: Figure) -> None:
     assert figure.emulator == pytest.approx(figure.model, rel=0.2)
 
 

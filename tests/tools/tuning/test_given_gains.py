@@ -3,8 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from emulator.config.table_config import load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, load_config
 from tools.tuning.given_gains import given_gains
 
 CONFIG = load_config()
@@ -56,8 +55,8 @@ def test_what_a_file_leaves_out_is_as_the_configuration_has_it(text: str, gains:
     [
         (HEAVY, "gains.toml: no gains; add .gains.ramp. or .gains.hold."),
         ("[gains]\n", "gains.toml: no gains; add"),
-        ("[gains.hold]\nproportional = 1\n", "gains.hold.proportional is not a key"),
-        ("[gains.hold]\nintegral_time_s = 0\n", "gains.hold.integral_time_s is 0; it must be at least"),
+        ("[gains.hold]\nproportional = 1\n", "gains.hold.proportional is not a known key"),
+        ("[gains.hold]\nintegral_time_s = 0\n", "gains.hold.integral_time_s is 0; it must be a finite number at least"),
         ("[gains.hold]\nproportional_duty_s_deg = 0\n", "does not fit the firmware"),
         ("[table]\ninertia_kg_m2 = 0.7\n" + HOLD, "gains.toml: its table is not that of .*table.toml; keep only"),
     ],

@@ -50,7 +50,7 @@ def emulated_answer(config: TableConfig, reference_deg_s: Array, load_Nm: Array)
 
 
 @pytest.mark.parametrize(("teeth", "backlash_arcmin"), [(Teeth.DRIVING, 0.0), (Teeth.FREE, 600.0)])
-def test_the_step_answer_is_the_emulators_without_friction_backlash_and_quantisation(
+def test_the_step_answer_is_the_emulators_without_friction_backlash_and_quantization(
     teeth: Teeth, backlash_arcmin: float
 ) -> None:
     config = frictionless(backlash_arcmin)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from emulator.config.table_config import GainsConfig, TableConfig, load_config
-from emulator.config.toml_section import ConfigError
+from emulator.config.table_config import ConfigError, GainsConfig, TableConfig, load_config
 from tests.tools.tuning import loop_oracle
 from tools.tuning import Teeth, closed_loop, gains_config, open_loop, plant, registers, regulator
 
@@ -150,7 +149,7 @@ def test_gains_in_engineering_units_are_those_of_the_registers(seed: int) -> Non
 @pytest.mark.parametrize(
     ("gains", "complaint"),
     [
-        (GainsConfig(float("nan"), 0.01, 0.001), "gains: proportional_duty_s_deg is nan; it must be finite"),
+        (GainsConfig(float("nan"), 0.01, 0.001), "gains: proportional_duty_s_deg is nan; it must be a finite number"),
         (GainsConfig(-0.01, 0.01, 0.001), "gains: proportional_duty_s_deg is -0.01; it must be at least 0"),
         (GainsConfig(0.01, 0.0, 0.001), "gains: integral_time_s is 0.0; it must be at least 1e-06"),
         (GainsConfig(0.01, 0.01, -1.0), "gains: derivative_time_s is -1.0; it must be at least 0"),

@@ -1,6 +1,6 @@
 """The figures of a gain set against a second way that shares no code with them.
 
-The plant is discretised by scipy from the constants of the configuration, the loop's response is walked along a dense
+The plant is discretized by scipy from the constants of the configuration, the loop's response is walked along a dense
 line of frequencies, and the answers in time come from iterating the closed loop's states tick by tick.
 """
 

@@ -7,7 +7,7 @@ from emulator.config.constants import fixed_gains
 from emulator.config.table_config import load_config
 from emulator.firmware.pid import Gains
 from tools.tuning.frequency_response import PlantResponse, grid_hz, grid_z, plant_response
-from tools.tuning.linear_model import Teeth, duty_gains, plant, quantisation_noise
+from tools.tuning.linear_model import Teeth, duty_gains, plant, quantization_noise
 from tools.tuning.loop import closed_loop
 from tools.tuning.loop_figures import step_answer
 from tools.tuning.margins import Margins, controller, margins, noise_duty
@@ -92,7 +92,7 @@ def test_a_loop_is_called_stable_when_all_its_poles_are_within_the_unit_circle(t
 def test_the_noise_at_the_pwm_is_that_of_the_answers_to_each_count() -> None:
     """The other way round: the variance is the sum over the squared answer to one count, tick by tick."""
     gains, z = fixed_gains(CONFIG, CONFIG.gains.ramp), grid_z()
-    count_deg, _ = quantisation_noise(CONFIG)
+    count_deg, _ = quantization_noise(CONFIG)
     window = CONFIG.control.speed_window_ticks
     window_s = window / CONFIG.control.tick_hz
     system = plant(CONFIG, Teeth.FREE)

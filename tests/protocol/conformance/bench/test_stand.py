@@ -15,7 +15,7 @@ from protocol.bench import BenchError
 from protocol.conformance.__main__ import main
 from protocol.conformance.bench.stand import POWER_CYCLE, TRIGGER, Programs, Stand
 from protocol.conformance.bench.wire import RecordedPort
-from protocol.conformance.cases.catalogue import chosen_cases
+from protocol.conformance.cases.catalog import chosen_cases
 from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import load_profile
 from protocol.conformance.pytest.fixture import RotaryTable

@@ -12,7 +12,7 @@ from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by
 
 
 @caught_by("2.1/3")
-class HonoursXoff(Mutant):
+class HonorsXoff(Mutant):
     """XOFF silences it"""
 
     deaf = False

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from protocol.conformance.cases.catalogue import all_cases, chosen_cases, only
+from protocol.conformance.cases.catalog import all_cases, chosen_cases, only
 from protocol.conformance.profile.clauses import specification
 
 PAGE = Path(__file__).parents[4] / "docs" / "protocol.md"

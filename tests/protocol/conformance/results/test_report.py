@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from protocol.conformance.bench.wire import Event
-from protocol.conformance.cases.catalogue import chosen_cases
+from protocol.conformance.cases.catalog import chosen_cases
 from protocol.conformance.judgement.verdict import Measurement, Verdict
 from protocol.conformance.profile.profile import load_profile
 from protocol.conformance.results.record import Header, write_junit, write_record

@@ -14,7 +14,7 @@ from emulator.protocol_emulator import Serial
 from protocol.conformance.bench.ports import SessionError
 from protocol.conformance.bench.stand import InProcess, Stand, stand_beside
 from protocol.conformance.bench.wire import RecordedPort, ReopenablePort, Wire
-from protocol.conformance.cases.catalogue import all_cases, chosen_cases
+from protocol.conformance.cases.catalog import all_cases, chosen_cases
 from protocol.conformance.cases.random_walk import SIMULATED, search, walk
 from protocol.conformance.judgement.rig import Rig
 from protocol.conformance.judgement.verdict import NonconformityError, Verdict

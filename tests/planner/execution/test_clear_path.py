@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from planner.execution.free_way import WayError, check_ends, is_free, nearest_turns, turns_to_start
+from planner.execution.clear_path import BlockedPathError, check_ends, is_clear, nearest_turns, turns_to_start
 from planner.execution.table_motion import TableMotion
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import blocks_map
@@ -16,15 +16,15 @@ def walled() -> ConfigurationMap:
     return blocks_map(8, 360, [(0, 7, 100, 120)], edge=0)
 
 
-def test_a_way_is_free_only_where_no_sample_on_it_or_beside_it_is_forbidden(walled: ConfigurationMap) -> None:
-    assert is_free(walled, 0, 50.0, 99.0)
-    assert not is_free(walled, 0, 50.0, 99.5)
-    assert not is_free(walled, 0, 90.0, 130.0)
-    assert is_free(walled, 0, 121.0, 459.0)
-    assert not is_free(walled, 0, -270.0, -230.0)
+def test_a_path_is_clear_only_where_no_sample_on_it_or_beside_it_is_forbidden(walled: ConfigurationMap) -> None:
+    assert is_clear(walled, 0, 50.0, 99.0)
+    assert not is_clear(walled, 0, 50.0, 99.5)
+    assert not is_clear(walled, 0, 90.0, 130.0)
+    assert is_clear(walled, 0, 121.0, 459.0)
+    assert not is_clear(walled, 0, -270.0, -230.0)
 
 
-def test_the_start_is_reached_the_short_way_where_that_is_free(walled: ConfigurationMap) -> None:
+def test_the_start_is_reached_the_short_way_where_that_is_clear(walled: ConfigurationMap) -> None:
     assert turns_to_start(walled, 90.0, 20.0) == 0
     assert turns_to_start(walled, 710.0, 20.0) == 2
     assert turns_to_start(walled, -350.0, 20.0) == -1
@@ -54,16 +54,16 @@ def test_the_way_to_the_start_is_the_shorter_of_the_free_ones(seed: int) -> None
     ways = {abs(end - position_deg): end for end in ends_deg if abs(end - position_deg) < 360.0}
     free = [way for way, end in ways.items() if free_by_small_steps(configuration_map, position_deg, end)]
     if not free:
-        with pytest.raises(WayError):
+        with pytest.raises(BlockedPathError):
             turns_to_start(configuration_map, position_deg, start_deg)
         return
     chosen = start_deg + 360.0 * turns_to_start(configuration_map, position_deg, start_deg)
     assert chosen == pytest.approx(ways[min(free)])
 
 
-def test_without_a_free_way_nothing_is_moved() -> None:
+def test_without_a_clear_path_nothing_is_moved() -> None:
     walled_twice = blocks_map(8, 360, [(0, 7, 100, 120), (0, 7, 200, 220)], edge=0)
-    with pytest.raises(WayError, match="draw the arm back, and say so with --arm-away"):
+    with pytest.raises(BlockedPathError, match="draw the arm back, and say so with --arm-away"):
         turns_to_start(walled_twice, 0.0, 150.0)
 
 
@@ -80,7 +80,7 @@ def moving(angle_deg: float, speed_deg_s: float, configuration_map: Configuratio
 def test_a_run_up_or_a_stop_through_a_forbidden_region_is_refused(
     walled: ConfigurationMap, angle_deg: float, speed_deg_s: float, what: str
 ) -> None:
-    with pytest.raises(WayError, match=what):
+    with pytest.raises(BlockedPathError, match=what):
         check_ends(walled, moving(angle_deg, speed_deg_s, walled))
 
 

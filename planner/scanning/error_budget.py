@@ -29,7 +29,7 @@ SAMPLES = 40_000
 _NEAREST_BLOCK = 1000
 
 
-class Part(StrEnum):
+class Source(StrEnum):
     """A contribution to the error."""
 
     PROBE = "probe noise"
@@ -40,7 +40,7 @@ class Part(StrEnum):
     CALIBRATION = "calibration"
 
 
-TABLE_PARTS = (Part.ROUNDING, Part.ENCODER, Part.BACKLASH)
+TABLE_PARTS = (Source.ROUNDING, Source.ENCODER, Source.BACKLASH)
 
 
 class Distances(NamedTuple):
@@ -80,7 +80,7 @@ class Total(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Account:
+class ErrorBudget:
     """The error of a cloud.
 
     Attributes:
@@ -99,7 +99,7 @@ class Account:
     distances: Distances
     total: Total
     none_mm: float
-    parts: dict[Part, Contribution]
+    parts: dict[Source, Contribution]
     sum_mm: float
     rounding_mm: float
     radius_mm: float
@@ -157,27 +157,27 @@ class Chain:
     known: Calibration
     flange_poses: Callable[[FloatArray], FloatArray]
 
-    def angles_deg(self, on: Collection[Part]) -> FloatArray:
+    def angles_deg(self, on: Collection[Source]) -> FloatArray:
         """Return the table's angle as latched with some parts of the chain switched on."""
         run = self.run
-        angle = run.edge_deg if Part.TIMING in on else run.true_deg
+        angle = run.edge_deg if Source.TIMING in on else run.true_deg
         if run.tells_truth:
             steps = {
-                Part.BACKLASH: run.shaft_deg - run.edge_deg,
-                Part.ENCODER: run.latched_deg - run.shaft_deg,
-                Part.ROUNDING: run.angles_deg - run.latched_deg,
+                Source.BACKLASH: run.shaft_deg - run.edge_deg,
+                Source.ENCODER: run.latched_deg - run.shaft_deg,
+                Source.ROUNDING: run.angles_deg - run.latched_deg,
             }
             angle = angle + sum((error for part, error in steps.items() if part in on), np.zeros_like(angle))
         return angle
 
-    def poses(self, on: Collection[Part]) -> FloatArray:
+    def poses(self, on: Collection[Source]) -> FloatArray:
         """Return T_WS `(n, 4, 4)` with some parts switched on."""
-        joints = self.run.joints_deg if Part.TIMING in on else self.run.true_joints_deg
-        placements = self.known if Part.CALIBRATION in on else self.true
+        joints = self.run.joints_deg if Source.TIMING in on else self.run.true_joints_deg
+        placements = self.known if Source.CALIBRATION in on else self.true
         return probe_poses(placements, self.flange_poses(joints), self.angles_deg(on))
 
 
-def account(chain: Chain, samples: Profiles, mesh: trimesh.Trimesh, wire_step_deg: float) -> Account:
+def error_budget_of(chain: Chain, samples: Profiles, mesh: trimesh.Trimesh, wire_step_deg: float) -> ErrorBudget:
     """Return what contributes how much to the error of a cloud's samples.
 
     Args:
@@ -186,29 +186,29 @@ def account(chain: Chain, samples: Profiles, mesh: trimesh.Trimesh, wire_step_de
         mesh: The workpiece.
         wire_step_deg: The wire's smallest difference.
     """
-    everything = frozenset(Part)
+    everything = frozenset(Source)
 
-    def moved(on: Collection[Part]) -> FloatArray:
+    def moved(on: Collection[Source]) -> FloatArray:
         points_S = (
-            samples.points_S if Part.PROBE in on else samples.points_S - samples.noise_mm[:, None] * samples.rays_S
+            samples.points_S if Source.PROBE in on else samples.points_S - samples.noise_mm[:, None] * samples.rays_S
         )
         return aligned(chain.poses(on), samples.profiles, points_S) - samples.true_W
 
     def across_mm(displacement: FloatArray) -> float:
         return _rms(np.einsum("ij,ij->i", displacement, samples.normals_W))
 
-    def contribution(part: Part) -> Contribution:
+    def contribution(part: Source) -> Contribution:
         alone = moved({part})
         return Contribution(_rms(alone, 3), across_mm(alone), across_mm(moved(everything - {part})))
 
     together, none = moved(everything), moved(())
-    parts = {part: contribution(part) for part in Part if chain.run.tells_truth or part not in TABLE_PARTS}
+    parts = {part: contribution(part) for part in Source if chain.run.tells_truth or part not in TABLE_PARTS}
     points_W = samples.true_W + together
     errors_mm = signed_distances_mm(mesh, points_W)
     T_TW = chain.true.T_TW
     radii_mm = np.hypot(*(samples.true_W @ T_TW[:2, :3].T + T_TW[:2, 3]).T)
     radius_mm = _rms(radii_mm)
-    return Account(
+    return ErrorBudget(
         distances=Distances.of(errors_mm),
         total=Total(_rms(together, 3), across_mm(together)),
         none_mm=_rms(none, 3),

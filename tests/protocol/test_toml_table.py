@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from planner.errors import ScanFileError
-from planner.toml_table import TomlTable
+from protocol.data_file import DataFileError
+from protocol.toml_table import TomlTable
 
 FILE = Path("cell.toml")
 
@@ -44,6 +44,9 @@ def test_an_absent_key_takes_its_default() -> None:
         (lambda t: t.numbers("key", 2), [1], r"key is \[1\]; it must be a list of 2 finite numbers"),
         (lambda t: t.numbers("key", 1), ["1"], r"key is \['1'\]"),
         (lambda t: t.numbers("key", 1), 1, "key is 1"),
+        (lambda t: t.switch("key"), 1, "key is 1; it must be true or false"),
+        (lambda t: t.count("key", at_least=1, at_most=9), 2.0, "key is 2.0; it must be a whole number from 1 to 9"),
+        (lambda t: t.tables("key"), [1], r"key is \[1\]; it must be a list of tables"),
         (lambda t: t.text("key"), "", "key is ''; it must be a text"),
         (lambda t: t.choice("key", ("a", "b")), "c", "key is 'c'; it must be one of a, b"),
         (lambda t: t.choice("key", ("a", "b")), [], r"key is \[\]"),
@@ -55,20 +58,27 @@ def test_an_absent_key_takes_its_default() -> None:
 def test_a_value_that_is_not_allowed_is_refused(
     read: Callable[[TomlTable], object], value: object, message: str
 ) -> None:
-    with pytest.raises(ScanFileError, match=message):
+    with pytest.raises(DataFileError, match=message):
         read(table(key=value))
+
+
+@pytest.mark.parametrize("text", ["", "1", "2197:27", "2197/0", "-1/2", "1/-2", "1.5/2", "1/2/3", "9" * 5000 + "/1"])
+def test_a_text_that_is_not_a_fraction_of_integers_is_refused(text: str) -> None:
+    with pytest.raises(DataFileError, match="a finite number, or a fraction such as"):
+        table(key=text).number("key", fraction=True)
+    assert table(key="7/4").number("key", fraction=True) == 1.75
 
 
 def test_a_key_that_nothing_reads_is_refused_with_those_that_are_known() -> None:
     values = table(radius_mm=5.0, raduis_mm=6.0)
     values.number("radius_mm")
     values.number("height_mm", 1.0)
-    with pytest.raises(ScanFileError, match="raduis_mm is not a known key; known are height_mm, radius_mm"):
+    with pytest.raises(DataFileError, match="raduis_mm is not a known key; known are height_mm, radius_mm"):
         values.finish()
 
 
 def test_an_inner_key_is_named_by_its_whole_path() -> None:
-    with pytest.raises(ScanFileError, match=r"cell.toml: outer.inner.x is missing"):
+    with pytest.raises(DataFileError, match=r"cell.toml: outer.inner.x is missing"):
         table(outer={"inner": {}}).table("outer").table("inner").number("x")
 
 
@@ -76,5 +86,5 @@ def test_an_inner_key_is_named_by_its_whole_path() -> None:
 def test_a_file_that_is_not_toml_is_refused(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "bad.toml"
     file.write_bytes(content)
-    with pytest.raises(ScanFileError, match=r"bad.toml: (is not TOML|cannot be read: it is not text)"):
+    with pytest.raises(DataFileError, match=r"bad.toml: (is not TOML|cannot be read: it is not text)"):
         TomlTable.load(file)

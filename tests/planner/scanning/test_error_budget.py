@@ -13,9 +13,10 @@ from planner.geometry.ray_casting import RayCaster
 from planner.geometry.transforms import rigid_inverse
 from planner.kinematics.arm import Arm
 from planner.scanning.alignment import Calibration, probe_poses
-from planner.scanning.error_account import Account, Chain, Part, Samples, account, signed_distances_mm
+from planner.scanning.error_budget import Chain, ErrorBudget, Samples, Source, error_budget_of, signed_distances_mm
 from planner.scanning.latched_run import LatchedRun
 from planner.scanning.probe import LaserProbe, measure
+from tests.planner.goals import goal_flange_poses
 
 CELL = Cell()
 TRUE = Calibration.of(CELL)
@@ -42,7 +43,7 @@ def made_up_chain(
     edge_deg = true_deg + 0.001
     shaft_deg = edge_deg - backlash_deg
     latched_deg: FloatArray = np.round(shaft_deg * counts_per_deg) / counts_per_deg
-    T_BF = CELL.goal_flange_poses(poses_round_the_block(), true_deg)[np.arange(PROFILES), np.arange(PROFILES)]
+    T_BF = goal_flange_poses(CELL, poses_round_the_block(), true_deg)[np.arange(PROFILES), np.arange(PROFILES)]
     numbers = np.tile(np.arange(PROFILES, dtype=np.float64)[:, np.newaxis], (1, 6))
     times_s = np.linspace(0.0, 24.0, PROFILES)
     run = LatchedRun(
@@ -53,20 +54,20 @@ def made_up_chain(
     return Chain(run, TRUE, known, lambda joints: T_BF[joints[:, 0].astype(int)])
 
 
-def accounted(chain: Chain, decimals: int, probe: LaserProbe | None = None) -> Account:
+def budget(chain: Chain, decimals: int, probe: LaserProbe | None = None) -> ErrorBudget:
     samples = Samples()
     probe = probe or LaserProbe(points_per_line=16)
     samples.take(0, measure(RayCaster(BLOCK), probe, chain.poses(()), chain.run.numbers))
-    return account(chain, samples.all(), BLOCK, 10.0**-decimals)
+    return error_budget_of(chain, samples.all(), BLOCK, 10.0**-decimals)
 
 
 def test_switched_off_together_only_the_arithmetic_is_left() -> None:
-    assert accounted(made_up_chain(1), 1).none_mm < 1e-9
+    assert budget(made_up_chain(1), 1).none_mm < 1e-9
 
 
 def test_switched_on_together_it_is_the_wire() -> None:
     chain = made_up_chain(1)
-    everything = frozenset(Part)
+    everything = frozenset(Source)
     assert chain.angles_deg(everything) == pytest.approx(chain.run.angles_deg, abs=1e-12)
     run = chain.run
     expected = probe_poses(chain.known, chain.flange_poses(run.joints_deg), run.angles_deg)
@@ -76,40 +77,44 @@ def test_switched_on_together_it_is_the_wire() -> None:
 
 def test_rounding_costs_what_the_closed_form_says() -> None:
     for decimals, tolerance in ((1, 0.05), (2, 0.05)):
-        result = accounted(made_up_chain(decimals), decimals)
+        result = budget(made_up_chain(decimals), decimals)
         step = math.radians(10.0**-decimals) / math.sqrt(12.0)
         assert result.rounding_mm == pytest.approx(step * result.radius_mm)
-        assert result.parts[Part.ROUNDING].displacement_mm == pytest.approx(result.rounding_mm, rel=tolerance)
+        assert result.parts[Source.ROUNDING].displacement_mm == pytest.approx(result.rounding_mm, rel=tolerance)
 
 
 def test_the_parts_are_those_that_were_put_in() -> None:
-    result = accounted(made_up_chain(1), 1)
+    result = budget(made_up_chain(1), 1)
     moved_mm = {part: share.displacement_mm for part, share in result.parts.items()}
     radius_mm = result.radius_mm
-    assert moved_mm[Part.PROBE] == pytest.approx(0.025, rel=0.04)
-    assert moved_mm[Part.BACKLASH] == pytest.approx(math.radians(0.08) * radius_mm, rel=1e-6)
-    assert moved_mm[Part.TIMING] == pytest.approx(math.radians(0.001) * radius_mm, rel=0.01)
-    assert moved_mm[Part.ENCODER] == pytest.approx(math.radians(1.0 / 512.0) / math.sqrt(12.0) * radius_mm, rel=0.1)
-    assert moved_mm[Part.CALIBRATION] == pytest.approx(0.02, rel=1e-6)
+    assert moved_mm[Source.PROBE] == pytest.approx(0.025, rel=0.04)
+    assert moved_mm[Source.BACKLASH] == pytest.approx(math.radians(0.08) * radius_mm, rel=1e-6)
+    assert moved_mm[Source.TIMING] == pytest.approx(math.radians(0.001) * radius_mm, rel=0.01)
+    assert moved_mm[Source.ENCODER] == pytest.approx(math.radians(1.0 / 512.0) / math.sqrt(12.0) * radius_mm, rel=0.1)
+    assert moved_mm[Source.CALIBRATION] == pytest.approx(0.02, rel=1e-6)
 
 
 def test_independent_parts_add_up_by_their_squares() -> None:
-    result = accounted(made_up_chain(1, backlash_deg=0.0), 1)
+    result = budget(made_up_chain(1, backlash_deg=0.0), 1)
     assert result.sum_mm == pytest.approx(result.total.displacement_mm, rel=0.05)
 
 
-def test_with_three_decimals_no_backlash_and_exact_calibration_the_cloud_is_within_30_micrometres() -> None:
-    result = accounted(made_up_chain(3, backlash_deg=0.0, off_mm=0.0), 3)
+def test_with_three_decimals_no_backlash_and_exact_calibration_the_cloud_is_within_30_micrometers() -> None:
+    result = budget(made_up_chain(3, backlash_deg=0.0, off_mm=0.0), 3)
     assert 0.020 < result.distances.sigma < 0.030
-    assert result.parts[Part.CALIBRATION].displacement_mm < 1e-9
-    assert result.parts[Part.PROBE].without_mm < 0.005
+    assert result.parts[Source.CALIBRATION].displacement_mm < 1e-9
+    assert result.parts[Source.PROBE].without_mm < 0.005
 
 
 def test_without_the_table_s_truth_its_parts_are_left_out() -> None:
     chain = made_up_chain(1)
     wire = chain.run.angles_deg
     run = replace(chain.run, true_deg=wire, edge_deg=wire, shaft_deg=wire, latched_deg=wire, tells_truth=False)
-    assert set(accounted(replace(chain, run=run), 1).parts) == {Part.PROBE, Part.TIMING, Part.CALIBRATION}
+    assert set(budget(replace(chain, run=run), 1).parts) == {
+        Source.PROBE,
+        Source.TIMING,
+        Source.CALIBRATION,
+    }
 
 
 def test_distances_are_signed_and_exact() -> None:
@@ -137,10 +142,10 @@ def test_samples_are_an_even_choice_in_bounded_memory() -> None:
 
 @pytest.mark.parametrize("counts_per_deg", [16.0, 100.0, 512.0, 40_000.0])
 def test_encoder_and_backlash_are_those_of_the_table_whatever_its_counts(counts_per_deg: float) -> None:
-    result = accounted(made_up_chain(3, backlash_deg=0.0, counts_per_deg=counts_per_deg), 3)
+    result = budget(made_up_chain(3, backlash_deg=0.0, counts_per_deg=counts_per_deg), 3)
     step_mm = math.radians(1.0 / counts_per_deg) * result.radius_mm
-    assert result.parts[Part.ENCODER].displacement_mm == pytest.approx(step_mm / math.sqrt(12.0), rel=0.1)
-    assert result.parts[Part.BACKLASH].displacement_mm < 1e-9
+    assert result.parts[Source.ENCODER].displacement_mm == pytest.approx(step_mm / math.sqrt(12.0), rel=0.1)
+    assert result.parts[Source.BACKLASH].displacement_mm < 1e-9
 
 
 def test_the_arm_s_own_kinematics_serve_the_chain() -> None:

@@ -36,11 +36,11 @@ class LegendEntry(NamedTuple):
     """A reason as it is shown: its text, its color, and the share of the map's cells that it forbids."""
 
     text: str
-    colour: str
+    color: str
     share: float
 
 
-def coloured(configuration_map: ConfigurationMap) -> tuple[FloatArray, list[LegendEntry]]:
+def colored(configuration_map: ConfigurationMap) -> tuple[FloatArray, list[LegendEntry]]:
     """Return the map as an RGB image `(n_angles, n_locations, 3)` and its legend, the most frequent reason first."""
     gray = DARKEST_GRAY + (1.0 - DARKEST_GRAY) * configuration_map.values.T
     image = np.repeat(gray[:, :, None], 3, axis=2)
@@ -50,11 +50,11 @@ def coloured(configuration_map: ConfigurationMap) -> tuple[FloatArray, list[Lege
     texts = configuration_map.metadata.get("reasons", {})
     assert isinstance(texts, Mapping)
     shares: dict[tuple[str, str], float] = {}
-    for code, count, colour in _by_frequency(reasons):
-        image[code == reasons.T] = to_rgb(colour)
-        text = "other collisions" if colour == _OTHER_COLLISIONS else str(texts.get(code, f"reason {code}"))
-        shares[text, colour] = shares.get((text, colour), 0.0) + count / reasons.size
-    return image, [LegendEntry(text, colour, share) for (text, colour), share in shares.items()]
+    for code, count, color in _by_frequency(reasons):
+        image[code == reasons.T] = to_rgb(color)
+        text = "other collisions" if color == _OTHER_COLLISIONS else str(texts.get(code, f"reason {code}"))
+        shares[text, color] = shares.get((text, color), 0.0) + count / reasons.size
+    return image, [LegendEntry(text, color, share) for (text, color), share in shares.items()]
 
 
 def _by_frequency(reasons: CodeArray) -> list[tuple[int, int, str]]:
@@ -62,10 +62,10 @@ def _by_frequency(reasons: CodeArray) -> list[tuple[int, int, str]]:
     codes, counts = np.unique(reasons[reasons != Reason.REACHED], return_counts=True)
     order = np.argsort(-counts, kind="stable")
     collisions = iter(_COLLISION)
-    return [(int(codes[i]), int(counts[i]), _colour(int(codes[i]), collisions)) for i in order]
+    return [(int(codes[i]), int(counts[i]), _color(int(codes[i]), collisions)) for i in order]
 
 
-def _colour(code: int, collisions: Iterator[str]) -> str:
+def _color(code: int, collisions: Iterator[str]) -> str:
     if code >= FIRST_PAIR:
         return next(collisions, _OTHER_COLLISIONS)
     if code >= FIRST_USER_FACTOR:

@@ -1,4 +1,4 @@
-"""The catalogue of all cases, and how some of them are chosen by their ids."""
+"""The catalog of all cases, and how some of them are chosen by their ids."""
 
 import re
 from collections.abc import Sequence

@@ -1,0 +1,110 @@
+"""Building the firmware, and the simulator's library, with the compilers of the distribution.
+
+What was built is kept in the user's cache folder under a digest of everything that it was made of, and appears there
+only when it is whole.
+"""
+
+import hashlib
+import subprocess
+from functools import cache
+from pathlib import Path
+from shutil import which
+from tempfile import TemporaryDirectory
+
+from emulator.avr.errors import ToolchainError
+from emulator.avr.header import header_text
+from emulator.config.table_config import TableConfig
+from protocol.kept_code import cache_root
+from protocol.whole_file import whole_file
+
+FIRMWARE = Path(__file__).with_name("firmware")
+CONSTANTS = FIRMWARE / "table_constants.h"
+_SHIM = Path(__file__).with_name("host") / "chip.c"
+_HEADERS = Path("/usr/include/simavr/sim_avr.h")
+_INSTALL = "install the packages gcc, gcc-avr, avr-libc and libsimavr-dev (apt-get install ...)"
+
+COMPILE = (
+    *("avr-gcc", "-mmcu=atmega328p", "-DF_CPU=16000000UL", "-std=gnu99", "-O2"),
+    *("-Wall", "-Wextra", "-Wconversion", "-Wstrict-prototypes", "-Wmissing-prototypes", "-Wshadow", "-Werror"),
+    *("-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections,--undefined=table_digest"),
+)
+_COMPILE_SHIM = ("gcc", "-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-I/usr/include/simavr")
+
+
+def lacking() -> str:
+    """Return what this machine lacks to build the firmware and run it, or nothing."""
+    for program in ("avr-gcc", "gcc"):
+        if which(program) is None:
+            return f"{program} is not installed; {_INSTALL}"
+    return "" if _HEADERS.is_file() else f"libsimavr-dev is not installed; {_INSTALL}"
+
+
+def build_firmware(config: TableConfig, sources: Path = FIRMWARE) -> Path:
+    """Return the ELF file of the firmware for a configured table.
+
+    Raises:
+        ConfigError: the controller cannot run such a table.
+        ToolchainError: it cannot be built.
+    """
+    header = header_text(config, "a table's configuration")
+    digest = hashlib.sha256()
+    for part in (_version("avr-gcc"), " ".join(COMPILE), header):
+        digest.update(part.encode())
+    for source in sorted(sources.glob("*.[ch]")):
+        digest.update(source.name.encode() + source.read_bytes())
+    built = _folder() / f"table-{digest.hexdigest()[:24]}.elf"
+    if not built.is_file():
+        with TemporaryDirectory() as folder:
+            for source in sources.glob("*.[ch]"):
+                (Path(folder) / source.name).write_bytes(source.read_bytes())
+            (Path(folder) / CONSTANTS.name).write_text(header, encoding="ascii")
+            _compile(built, [*COMPILE, *sorted(map(str, Path(folder).glob("*.c")))])
+    return built
+
+
+def build_simulator() -> Path:
+    """Return the shared library that runs the firmware.
+
+    Raises:
+        ToolchainError: it cannot be built.
+    """
+    digest = hashlib.sha256(_SHIM.read_bytes())
+    for part in (_version("gcc"), " ".join(_COMPILE_SHIM)):
+        digest.update(part.encode())
+    built = _folder() / f"chip-{digest.hexdigest()[:24]}.so"
+    if not built.is_file():
+        _compile(built, [*_COMPILE_SHIM, str(_SHIM), "-lsimavr", "-lm"])
+    return built
+
+
+def _folder() -> Path:
+    folder = cache_root() / "firmware"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ToolchainError(f"{folder}: cannot create the folder: {error.strerror}; set XDG_CACHE_HOME") from error
+    return folder
+
+
+def _compile(built: Path, command: list[str]) -> None:
+    try:
+        with whole_file(built) as partial:
+            subprocess.run(  # noqa: S603  # the command is ours
+                [*command, "-o", str(partial)], check=True, capture_output=True, text=True
+            )
+    except FileNotFoundError as error:
+        raise ToolchainError(f"{command[0]} is not installed; {_INSTALL}") from error
+    except subprocess.CalledProcessError as error:
+        raise ToolchainError(f"{command[0]} failed: {error.stderr.strip()}; {_INSTALL}") from error
+    except OSError as error:
+        raise ToolchainError(f"{built}: {error.strerror}; set XDG_CACHE_HOME to a folder with room") from error
+
+
+@cache
+def _version(compiler: str) -> str:
+    try:
+        return subprocess.run(  # noqa: S603  # one of two names
+            [compiler, "--version"], check=True, capture_output=True, text=True
+        ).stdout
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise ToolchainError(f"{compiler} is not installed; {_INSTALL}") from error

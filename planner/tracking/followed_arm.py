@@ -1,0 +1,53 @@
+"""The arm on the way of the table, step by step: its joints at the exact angles, on turns that go on from the last."""
+
+import numpy as np
+
+from planner.arrays import CodeArray, FloatArray
+from planner.cell.cell import Cell
+from planner.kinematics.configuration import Configuration
+from planner.kinematics.inverse_kinematics import inverse_kinematics
+from planner.kinematics.joint_path import joint_path
+from planner.reasons import Reason
+
+
+class FollowedArm:
+    """An arm in one configuration, and the flange's goals at the locations that are known."""
+
+    def __init__(self, cell: Cell, configuration: Configuration, step_s: float) -> None:
+        """Follow with the arm of `cell`, one location each `step_s`."""
+        self._cell, self._configuration, self._step_s = cell, configuration, step_s
+
+    def follow(self, joints: FloatArray, T_TF: FloatArray, angles_deg: FloatArray) -> FloatArray | None:
+        """Return the joints (n, 6) along n steps from joints (6,), in radians; None where a limit forbids them.
+
+        Joint limits count with all turns, and no joint is faster than its maximum speed.
+
+        Args:
+            joints: where the arm is.
+            T_TF: (n, 4, 4) the goals at the locations of the steps' ends.
+            angles_deg: (n,) the table's angles there.
+        """
+        solved, reasons = self._solve(T_TF, angles_deg)
+        rows = np.vstack((joints[np.newaxis], solved))
+        path = joint_path(self._cell.arm, rows, np.append(np.uint8(Reason.REACHED), reasons), self._step_s, joints)
+        # Another turn at the start is not this arm's way.
+        if path.step is not None or np.abs(path.joints[0] - joints).max() > 1e-9:
+            return None
+        return path.joints[1:]
+
+    def arrive(self, T_TF: FloatArray, angle_deg: float, before: FloatArray | None = None) -> FloatArray | None:
+        """Return the joints (6,) at a location (4, 4) where the arm has all the time that it needs; None: none.
+
+        On the turn nearest the middle of the range, or nearest the joints `before`.
+        """
+        solved, reasons = self._solve(T_TF[np.newaxis], np.array([angle_deg]))
+        path = joint_path(self._cell.arm, solved, reasons, self._step_s, before)
+        return None if path.step is not None else path.joints[0]
+
+    def robot_deg(self, joints: FloatArray) -> FloatArray:
+        """Return the robot's own angles (..., 6) of joints in radians."""
+        return self._cell.arm.robot_deg(joints)
+
+    def _solve(self, T_TF: FloatArray, angles_deg: FloatArray) -> tuple[FloatArray, CodeArray]:
+        joints, reasons = inverse_kinematics(self._cell.arm, self._cell.table_factors(angles_deg) @ T_TF)
+        return joints[:, self._configuration], reasons[:, self._configuration]

@@ -1,0 +1,38 @@
+"""The price of not knowing: what a tracked path costs more than a plan that knows all of it."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from planner.planning.dynamic_programming import dynamic_programming
+from planner.planning.plan import Plan
+from planner.planning.problem import Problem
+
+
+class Price(NamedTuple):
+    """Costs of Eq. (7), in the configuration that was chosen; None where there is no plan without a pause.
+
+    Attributes:
+        tracked: of the path as it was tracked.
+        known_from_start: of the best plan from the same start that knows the whole path.
+        known: of the best plan with a free start.
+    """
+
+    tracked: float
+    known_from_start: float | None
+    known: float | None
+
+    @property
+    def ratio(self) -> float | None:
+        """The tracked cost against that of the best plan with a free start."""
+        return None if self.known is None else self.tracked / self.known
+
+
+def price_of_not_knowing(problem: Problem, plan: Plan) -> Price:
+    """Return the price of a tracked path over its whole map."""
+
+    def cost(asked: Problem) -> float | None:
+        outcome = dynamic_programming(asked)
+        return outcome.cost.total if isinstance(outcome, Plan) else None
+
+    same_start = replace(problem, start_angle_deg=float(plan.angles_deg[0]), start_speed_deg_s=0.0)
+    return Price(plan.cost.total, cost(same_start), cost(replace(problem, start_angle_deg=None, start_speed_deg_s=0.0)))

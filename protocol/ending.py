@@ -1,0 +1,59 @@
+"""How every command line ends: its exit status, and one line where something is wrong."""
+
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+
+from protocol.interrupts import ended_by_signals, said, status_after
+
+_BAD_INPUT = 2
+
+
+def ended(name: str, work: Callable[[], int], *expected: type[Exception], interrupted: str = "interrupted") -> int:
+    """Run a command and return its exit status; expected failures, and those of files, are one line and status 2.
+
+    Args:
+        name: The command's, to begin that line with.
+        work: Returns the exit status.
+        expected: The errors that say what the user can do about them.
+        interrupted: What the line says after a signal.
+    """
+    try:
+        with ended_by_signals() as ending:
+            status = work()
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except KeyboardInterrupt as interrupt:
+        say(name, said(interrupt, interrupted))
+        return status_after(interrupt)
+    except BrokenPipeError:
+        give_up_stdout()
+        say(name, "nobody reads what it prints any more")
+        return _BAD_INPUT
+    except Exception as error:
+        if not isinstance(error, (*expected, OSError)):
+            raise
+        give_up_stdout()
+        say(name, said(error))
+        return ending.status(_BAD_INPUT)
+    return ending.status(status)
+
+
+def say(name: str, sentence: str) -> None:
+    """Write a line of the command `name` to the terminal, if there is one."""
+    if sys.stderr is not None:
+        with suppress(OSError):
+            sys.stderr.write(f"{name}: {sentence}\n")
+            sys.stderr.flush()
+
+
+def give_up_stdout() -> None:
+    """Let what is still to be printed go nowhere: else the interpreter complains of it again when it ends."""
+    with suppress(OSError, ValueError, AttributeError):
+        sys.stdout.flush()
+        return
+    with suppress(OSError, ValueError, AttributeError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
