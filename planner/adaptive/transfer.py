@@ -110,8 +110,8 @@ class Transfers:
 
     def _direct(self, start: Stance, end: Stance) -> Transfer | None:
         """Return the way on which the table turns while the arm moves from retracted to retracted."""
-        for retraction_mm in _RETRACTIONS_MM:
-            way = self._way(start, end, (), retraction_mm, retraction_mm)
+        for out_mm, in_mm in product(_RETRACTIONS_MM, _RETRACTIONS_MM):
+            way = self._way(start, end, (), out_mm, in_mm)
             if way is not None:
                 return way
         return None
