@@ -99,9 +99,14 @@ class KnownPart:
     @property
     def visible(self) -> BoolArray:
         """`(m,)` which places can be seen: those seen, and those that any candidate sees."""
+        return np.asarray(self.seen | self.sees.any(axis=0))
+
+    @property
+    def sees(self) -> BoolArray:
+        """`(n, m)` which of the candidates that are left see which places; none before strips were asked for."""
         if self._candidates is None:
-            return self.seen
-        return self.seen | self._candidates.sees[self._is_open].any(axis=0)
+            return np.zeros((0, len(self._places.points)), dtype=np.bool_)
+        return self._candidates.sees[self._is_open]
 
     @property
     def wanted(self) -> int:

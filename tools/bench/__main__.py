@@ -12,7 +12,7 @@ from importlib import import_module
 from protocol.command_line import Parser, program_name
 from protocol.ending import ended
 
-SUBJECTS = ("calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream")
+SUBJECTS = ("adaptive", "calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -27,6 +27,8 @@ def _run(options: argparse.Namespace, benches: Mapping[str, Callable[..., None]]
     for subject, bench in benches.items():
         if subject == "identify":
             bench(sys.stdout, options.plants, options.seed, options.jobs, options.pty, options.wide)
+        elif subject == "adaptive":
+            bench(sys.stdout, tuple(options.scan))
         else:
             bench(sys.stdout)
     return 0
@@ -40,6 +42,10 @@ def _parser() -> Parser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("subject", choices=SUBJECTS, nargs="+")
+    adaptive = parser.add_argument_group("for adaptive")
+    adaptive.add_argument(
+        "--scan", metavar="SCAN", action="append", default=[], help="a scan file (default: all shipped scans)"
+    )
     identify = parser.add_argument_group("for identify")
     identify.add_argument("--pty", action="store_true", help="in real time: takes minutes, on a quiet machine")
     identify.add_argument(

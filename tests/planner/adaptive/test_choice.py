@@ -1,24 +1,9 @@
 import numpy as np
 import pytest
-from ortools.sat.python import cp_model
 
 from planner.adaptive.choice import choose, exchange, lazy_greedy
 from planner.arrays import BoolArray
-
-
-def fewest(sees: BoolArray, wanted: int) -> int:
-    """The fewest strips that see at least so many places, by a solver that proves it."""
-    model = cp_model.CpModel()
-    taken = [model.new_bool_var(f"strip {i}") for i in range(len(sees))]
-    covered = [model.new_bool_var(f"place {j}") for j in range(sees.shape[1])]
-    for j, each in enumerate(covered):
-        model.add_bool_or([taken[i] for i in np.flatnonzero(sees[:, j])] + [~each])
-    model.add(sum(covered) >= wanted)
-    model.minimize(sum(taken))
-    solver = cp_model.CpSolver()
-    solver.parameters.num_workers = 1
-    assert solver.solve(model) == cp_model.OPTIMAL
-    return round(solver.objective_value)
+from tools.bench.set_cover import fewest_strips
 
 
 def patches(seed: int, strips: int, places: int, radius: float) -> BoolArray:
@@ -42,7 +27,7 @@ def test_hardly_more_strips_are_chosen_than_the_fewest() -> None:
         numbers = choose(sees, np.zeros(60, dtype=np.bool_), wanted, strips)
         assert sees[numbers].any(axis=0).sum() >= wanted
         chosen.append(len(numbers))
-        best.append(fewest(sees, wanted))
+        best.append(fewest_strips(sees, wanted).at_least)
         greedy.append(len(lazy_greedy(sees, wanted, strips)))
     assert all(ours <= max(1.15 * least, least + 1) for ours, least in zip(chosen, best, strict=True))
     assert sum(chosen) <= 1.06 * sum(best)
