@@ -2,6 +2,8 @@
 # make test    set up and run the tests
 # make lint    format, lint, type and prose checks
 # make docs    build the docs site into build/site
+# make firmware CONFIG=table.toml GAINS=gains.h   build the firmware of a table into build/firmware; both are optional
+# make flash PORT=/dev/ttyUSB0   write it into an Arduino board with an ATmega328P
 # make mutants plant 200 small faults and see which of them the tests do not find (half an hour)
 
 PYTHON ?= python3
@@ -13,7 +15,7 @@ INSTALL := PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet -
 # Prose: American spelling, and the words of docs/glossary.md.
 SPELLED := --builtin clear,rare,en-GB_to_en-US --ignore-words .ci/names README.md CONTRIBUTING.md CHANGELOG.md docs/*.md
 
-.PHONY: demo test lint docs mutants clean
+.PHONY: demo test lint docs firmware flash mutants clean
 
 demo: $(VENV)/demo.stamp
 	$(BIN)/python -m tools.demo --out build/demo
@@ -31,6 +33,13 @@ lint: $(VENV)/test.stamp
 
 docs: $(VENV)/test.stamp
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict -f docs/site/mkdocs.yml
+
+firmware: $(VENV)/demo.stamp
+	$(BIN)/python -m tools.firmware $(if $(CONFIG),--config $(CONFIG)) $(if $(GAINS),--gains $(GAINS)) --out build/firmware
+
+flash: firmware
+	@test -n "$(PORT)" || { echo "make flash: name the board's port: make flash PORT=/dev/ttyUSB0" >&2; exit 2; }
+	avrdude -p atmega328p -c arduino -P $(PORT) -b $(or $(BOOTLOADER_BAUD),115200) -D -U flash:w:build/firmware/table.hex:i
 
 mutants: $(VENV)/test.stamp
 	$(BIN)/python -m tools.mutation_score --count 200

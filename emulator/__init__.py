@@ -1,9 +1,9 @@
 """The emulator of the rotary table: firmware and plant behind a virtual serial port.
 
-Importing it teaches pyserial the port `emulator://`, a private table in virtual time.
+Importing it registers the port `emulator://` with pyserial: a private table in virtual time.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the imports that take long
+import protocol.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import serial

@@ -38,11 +38,11 @@ if TYPE_CHECKING:
 
 
 class UsageError(Exception):
-    """The command line or its surroundings do not allow a start; the message says what to do."""
+    """The command line or its environment does not allow a start. The message states the next step."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the emulator until it is told to end, and return the exit status."""
+    """Run the emulator until a signal or a command ends it, and return the exit status."""
     try:
         options = _parse(arguments)
         config = load_config(options.config).with_serial(
@@ -60,7 +60,7 @@ def main(arguments: list[str] | None = None) -> int:
         _say(f"--firmware: {error}")
         return 2
     except OSError as error:
-        _say(f"cannot go on: {error}; see that stdout is read")
+        _say(f"cannot continue: {error}; check that stdout is read")
         return 2
     return 0
 
@@ -137,7 +137,7 @@ def _seed(text: str) -> int:
 
 
 def _serve(options: argparse.Namespace, config: TableConfig, stack: ExitStack) -> None:
-    """Open what was asked for, publish the ports, and serve; `stack` closes all of it in the reverse order."""
+    """Open the requested ports, publish them, and serve. `stack` closes them in reverse order."""
     signals = stack.enter_context(SignalWatch(*SERVED_SIGNALS))
     table = _table(options, config)
     with _usage("--trigger-hz"):
@@ -180,7 +180,7 @@ def _open_ports(options: argparse.Namespace, config: TableConfig, stack: ExitSta
         stack.callback(port.close)
         ports.append(port)
     if options.rfc2217:
-        from emulator.ports.rfc2217_port import Rfc2217Port  # noqa: PLC0415  # rarely asked for, and a start should be quick
+        from emulator.ports.rfc2217_port import Rfc2217Port  # noqa: PLC0415  # rarely needed, and the start should be fast
 
         host, number = options.rfc2217
         with _usage(f"--rfc2217 {host}:{number}"):
@@ -192,7 +192,7 @@ def _open_ports(options: argparse.Namespace, config: TableConfig, stack: ExitSta
 
 def _open_pty(link_path: Path | None, baud: int, stack: ExitStack) -> Port:
     try:
-        # Here, since a system without ptys has not what these modules import.
+        # Imported here, because a system without ptys lacks what these modules import.
         from emulator.ports.device_link import DeviceLink  # noqa: PLC0415  # see above
         from emulator.ports.pty_port import PtyPort  # noqa: PLC0415  # see above
     except ImportError:
@@ -205,12 +205,12 @@ def _open_pty(link_path: Path | None, baud: int, stack: ExitStack) -> Port:
             port.link = link = DeviceLink(link_path, port.name)
         stack.callback(link.remove)
         if link.replaced:
-            _say(f"{link_path} led to {link.replaced} and now leads to {port.name}")
+            _say(f"{link_path} pointed to {link.replaced} and now points to {port.name}")
     return port
 
 
 def _open_control(path: Path, stack: ExitStack) -> "ControlSocket":
-    from emulator.server.control_socket import ControlSocket  # noqa: PLC0415  # rarely asked for, and a start should be quick
+    from emulator.server.control_socket import ControlSocket  # noqa: PLC0415  # rarely needed, and the start should be fast
 
     if not hasattr(socket, "AF_UNIX"):
         raise UsageError("--control: this system has no Unix sockets; start the table without it")
@@ -226,7 +226,7 @@ def _start_trace(path: Path, table: "AnyTable", config: TableConfig, stack: Exit
 
 @contextmanager
 def _usage(option: str) -> Iterator[None]:
-    """Turn what the system or a module refuses into a usage error that names the option."""
+    """Convert an error of the system or of a module into a usage error that names the option."""
     try:
         yield
     except OSError as error:
@@ -238,7 +238,7 @@ def _usage(option: str) -> Iterator[None]:
 def _say(sentence: str) -> None:
     try:
         print(f"emulator: {sentence}", file=sys.stderr, flush=True)
-    except OSError:  # Nobody reads any more. What is left in the buffer would fail once more when Python ends.
+    except OSError:  # Nobody reads stdout any more. The rest of the buffer would fail again when Python exits.
         with Path(os.devnull).open("w") as nobody:
             os.dup2(nobody.fileno(), sys.stderr.fileno())
 

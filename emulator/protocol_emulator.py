@@ -1,8 +1,8 @@
 """The pyserial port `emulator://`: a private table in the same process, in virtual time.
 
-pyserial finds this module by its name once `emulator` is imported. Time passes only in calls: `read` lets it pass until
-the bytes are there or the time-out is over, `flush` until all is sent, `clock.sleep_s` as long as it says. A look at
-`in_waiting`, or a read without waiting, that finds nothing takes one tick, so that a loop of them comes to an end.
+pyserial finds this module by its name once `emulator` is imported. Time passes only in calls. `read` advances it until
+the bytes are available or the timeout is over, `flush` until all bytes are sent, and `clock.sleep_s` by its argument. A
+look at `in_waiting`, or a read without waiting, that finds nothing takes one tick, so that a loop of them ends.
 """
 
 import math
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from emulator.avr.compiled_table import AnyTable
 
 OUTPUT_BYTES: Final = 4096
-"""What a write leaves to wait for the line, as the driver of a real port does, before it waits itself."""
+"""Maximum number of bytes in the buffer of the line, as in the driver of a real port, before a write waits."""
 
 RUN: Final = FastTicks()
-"""What passes the time of all tables of this process: compiled, once that pays."""
+"""Advances the time of all tables of this process; compiled code is used when that is faster."""
 
 _FORMS = {
     "config": "config=PATH",
@@ -46,7 +46,7 @@ SwitchOn = Callable[[TableConfig, int, Mapping[str, str]], "AnyTable"]
 
 
 class VirtualClock:
-    """The time of a private table, for clients that read time only from the clock of their port."""
+    """The clock of a private table, for clients that read time only from the clock of their port."""
 
     def __init__(self, port: "Serial") -> None:
         self._line = port
@@ -56,18 +56,18 @@ class VirtualClock:
         return self._line.table.tick / self._line.table.config.control.tick_hz
 
     def sleep_s(self, duration_s: float) -> None:
-        """Let simulated time pass."""
+        """Advance the simulated time."""
         self._line.advance(self._line.ticks(duration_s))
 
 
 class Serial(SerialBase):
-    """A pyserial port whose other end is a table of its own.
+    """A pyserial port with its own table at the other end.
 
-    Not for use by several threads. The table stays the same one when the port is closed and opened again.
+    It must not be used by several threads. The table stays the same when the port is closed and opened again.
 
     Attributes:
-        table: the table, from the first opening on: for tests.
-        clock: its time.
+        table: the table, from the first opening; for tests.
+        clock: the clock of the table.
     """
 
     table: "AnyTable"
@@ -82,7 +82,7 @@ class Serial(SerialBase):
         """Switch the table on at the first opening, and connect to it.
 
         Raises:
-            SerialException: the port is open, or its URL or the settings cannot be used.
+            SerialException: the port is open, or its URL or its settings cannot be used.
         """
         if self.is_open:
             raise SerialException("Port is already open.")
@@ -98,16 +98,16 @@ class Serial(SerialBase):
         self.is_open = True
 
     def close(self) -> None:
-        """Let what was written reach the table, and go; the motion that is running goes on."""
+        """Wait until the written bytes have reached the table, and disconnect. A running motion continues."""
         if self.is_open:
-            with suppress(SerialException):  # The device may go away with the bytes still on the line.
+            with suppress(SerialException):  # The device may disappear with bytes still on the line.
                 self.flush()
             self.table.disconnect()
             self.is_open = False
 
     @property
     def in_waiting(self) -> int:
-        """Bytes that can be read at once; finding none takes a tick."""
+        """Number of bytes that can be read without waiting; if there are none, one tick passes."""
         self._require_open()
         if not self._received:
             self.advance(1)
@@ -115,15 +115,15 @@ class Serial(SerialBase):
 
     @property
     def out_waiting(self) -> int:
-        """Bytes that have not reached the table."""
+        """Number of bytes that have not reached the table."""
         self._require_open()
         return self.table.received_queue
 
     def read(self, size: int = 1) -> bytes:
-        """Return `size` bytes, or fewer when the time-out passes first.
+        """Return `size` bytes, or fewer after the timeout.
 
         Raises:
-            SerialException: there is no time-out, and nothing will ever come.
+            SerialException: there is no timeout, and nothing will be received.
         """
         self._require_open()
         if self.timeout == 0 and not self._received:
@@ -136,7 +136,7 @@ class Serial(SerialBase):
         return self._take(size)
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
-        """Return bytes up to and with `expected`, `size` of them at most; fewer when the time-out passes first."""
+        """Return bytes up to and including `expected`, at most `size` of them; fewer after the timeout."""
         self._require_open()
         deadline = self._deadline(self.timeout)
         line = bytearray()
@@ -150,10 +150,10 @@ class Serial(SerialBase):
         return bytes(line)
 
     def write(self, b: "ReadableBuffer", /) -> int:
-        """Put bytes on the line and return their number; waits only when more are waiting there than a port holds.
+        """Send bytes and return their number. It waits only while the buffer of the port is full.
 
         Raises:
-            SerialTimeoutException: the write time-out passed first.
+            SerialTimeoutException: the write timeout passed first.
         """
         self._require_open()
         data = bytes(memoryview(b))
@@ -172,30 +172,30 @@ class Serial(SerialBase):
         return len(data)
 
     def flush(self) -> None:
-        """Let time pass until the table has all that was written."""
+        """Advance the time until the table has received everything that was written."""
         self._require_open()
         while self.out_waiting:
             self._advance_to_byte(None)
 
     def reset_input_buffer(self) -> None:
-        """Forget what has come and was not read."""
+        """Discard the received bytes that have not been read."""
         self._require_open()
         self._received.clear()
 
     def reset_output_buffer(self) -> None:
-        """Do nothing: what was written is on the line already."""
+        """Do nothing: the written bytes are on the line already."""
         self._require_open()
 
     def advance(self, ticks: int) -> None:
-        """Let simulated time pass; replies that come in it wait to be read."""
+        """Advance the simulated time. Replies received meanwhile wait for `read`."""
         self.table.advance(ticks)
         self._collect()
 
     def ticks(self, duration_s: float) -> int:
-        """Return the ticks that a duration takes, the last one whole."""
+        """Return a duration in ticks, rounded up."""
         return math.ceil(duration_s * self.table.config.control.tick_hz)
 
-    # A line of three wires: what pyserial asks of the others is answered as its network ports answer it.
+    # The line has three wires. Requests for the others return what pyserial's network ports return.
 
     @property
     def cts(self) -> bool:
@@ -225,9 +225,9 @@ class Serial(SerialBase):
 
     def _reconfigure_port(self) -> None:
         if self.bytesize != serial.EIGHTBITS or self.parity != serial.PARITY_NONE:
-            raise SerialException(f"{self.port}: the table talks 8N1; open it with 8 data bits and no parity")
+            raise SerialException(f"{self.port}: the table uses 8N1; open it with 8 data bits and no parity")
         if not self.baudrate:
-            raise SerialException(f"{self.port}: a baud rate of 0 would hang up; give the table's own")
+            raise SerialException(f"{self.port}: a baud rate of 0 would hang up; use the baud rate of the table")
 
     def _require_open(self) -> None:
         if not self.is_open:
@@ -236,27 +236,25 @@ class Serial(SerialBase):
 
     def _require_line(self) -> None:
         if self.table.hung_up:
-            raise SerialException(f"{self.port}: the device has gone (fault hang-up)")
+            raise SerialException(f"{self.port}: the device has disappeared (fault hang-up)")
 
     def _deadline(self, timeout_s: float | None) -> int | None:
         return None if timeout_s is None else self.table.tick + self.ticks(timeout_s)
 
     def _advance_to_byte(self, deadline: int | None) -> bool:
-        """Let time pass to the end of the next byte on the line; return False once the deadline has come."""
+        """Advance the time to the end of the next byte on the line; return False at the deadline."""
         return self._advance(self.table.ticks_until_byte(), deadline)
 
     def _advance_to_bytes(self, wanted: int, deadline: int | None) -> bool:
-        """Let time pass until `wanted` bytes may have come; return False once the deadline has come."""
-        if not self._is_understood():  # what is read of a byte depends on how many come in one piece
+        """Advance the time until `wanted` bytes may have been received; return False at the deadline."""
+        if not self._is_understood():  # the effect of faults on a byte depends on how many arrive at once
             return self._advance_to_byte(deadline)
         return self._advance(self.table.ticks_until_sent(wanted), deadline)
 
     def _advance(self, ticks: int | None, deadline: int | None) -> bool:
         if deadline is None:
             if ticks is None:
-                raise SerialException(
-                    f"{self.port}: without a time-out this read would wait for ever: nothing is coming"
-                )
+                raise SerialException(f"{self.port}: without a timeout this read would not end: no reply is pending")
             self.advance(ticks)
             return True
         left = deadline - self.table.tick

@@ -1,7 +1,7 @@
-"""Record what the table does, tick by tick, in a CSV or npz file.
+"""Record the state of the table, tick by tick, in a CSV or npz file.
 
-A row is one tick. A stretch in which nothing changes is written as its first and its last tick, so that a table at
-rest costs nothing and a line drawn through the rows is still the true one.
+A row is one tick. If nothing changes for some time, only the first and the last tick are written. So a table at rest
+needs no space, and a line through the rows is still correct.
 """
 
 import csv
@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
 
 class Trace(NamedTuple):
-    """A recorded run, one entry a row in every column. `received` and `transmitted` are the firmware's side."""
+    """A recorded run, with one entry per row in every column.
+
+    `received` and `transmitted` are from the firmware's side.
+    """
 
     time_s: "NDArray[np.float64]"
     reference_deg: "NDArray[np.float64]"
@@ -51,20 +54,20 @@ _Values = tuple[float | str, ...]
 
 
 class TraceError(Exception):
-    """A trace that cannot be begun or completed; the message says what there is of it, and what to do."""
+    """A trace that cannot be started or completed. The message names the partial file, and the next step."""
 
 
 class TraceWriter:
-    """A recorder for `Table.observer`. The file appears under its name when the trace is complete, and not before.
+    """A recorder for `Table.observer`. The file appears under its name only when the trace is complete.
 
-    Until then a CSV grows under the name with `.part` appended, for an npz too. A failure leaves it there.
+    Until then a CSV file with the suffix `.part` grows, for npz too. After a failure it remains.
 
     Args:
         path: ends in `.csv` or `.npz`.
-        tick_hz: ticks in a simulated second.
+        tick_hz: ticks per simulated second.
 
     Raises:
-        TraceError: the file cannot be written in the end, as far as that can be told now.
+        TraceError: the file cannot be written at the end, as far as this is known now.
     """
 
     def __init__(self, path: Path, tick_hz: int) -> None:
@@ -73,12 +76,12 @@ class TraceWriter:
         self._tick_hz = tick_hz
         self._partial = path.with_name(path.name + ".part")
         try:
-            # Exclusively: another emulator's trace is left alone, and no symbolic link is followed.
+            # Exclusive: another emulator's trace is not changed, and no symbolic link is followed.
             self._file = self._partial.open("x", encoding="ascii", newline="")
         except FileExistsError:
             raise TraceError(
-                f"{self._partial} exists: another emulator writes it, or one that failed left it; "
-                "choose another name, or remove it"
+                f"{self._partial} exists: another emulator is writing it, or a failed one left it; "
+                "choose another name, or remove the file"
             ) from None
         except OSError as error:
             raise TraceError(f"{path}: {error.strerror}; choose another name") from error
@@ -92,7 +95,7 @@ class TraceWriter:
         """Record one tick.
 
         Raises:
-            TraceError: what was written until now stays under the name that ends in `.part`.
+            TraceError: the rows written so far remain in the file that ends in `.part`.
         """
         values: _Values = _values_of(status)
         if values != self._last or received or transmitted:
@@ -101,15 +104,15 @@ class TraceWriter:
         self._last, self._last_tick = values, status.tick
 
     def close(self) -> None:
-        """Complete the file and give it its name.
+        """Complete the file and rename it.
 
         Raises:
-            TraceError: what was written until now stays under the name that ends in `.part`.
+            TraceError: the rows written so far remain in the file that ends in `.part`.
         """
         self._write_held(self._last_tick)
         try:
             self._file.flush()
-            os.fsync(self._file.fileno())  # some file systems notice only here that they are full
+            os.fsync(self._file.fileno())  # some file systems report only here that they are full
             self._file.close()
             if self._path.suffix == ".csv":
                 self._partial.replace(self._path)
@@ -119,7 +122,7 @@ class TraceWriter:
             raise self._failed(error) from error
 
     def abandon(self) -> None:
-        """Leave what was written under the name that ends in `.part`."""
+        """Leave the rows written so far in the file that ends in `.part`."""
         with suppress(OSError):
             self._file.close()
 
@@ -135,7 +138,7 @@ class TraceWriter:
             self.abandon()
 
     def _write_held(self, tick: int) -> None:
-        """Write the last tick of a stretch without change, when it is not there yet."""
+        """Write the last tick of a run without change, unless it is already written."""
         if self._last and tick > self._written_tick:
             self._write(tick, self._last, b"", b"")
 
@@ -150,10 +153,10 @@ class TraceWriter:
             raise self._failed(error) from error
 
     def _failed(self, error: OSError | MemoryError) -> TraceError:
-        """Close the file, and return the error that names what is left of it."""
+        """Close the file, and return the error that names the remaining file."""
         self.abandon()
         reason = (isinstance(error, OSError) and error.strerror) or "out of memory"
-        return TraceError(f"{self._path}: {reason}; what was written until then is in {self._partial}, as CSV")
+        return TraceError(f"{self._path}: {reason}; the rows written so far are in {self._partial}, as CSV")
 
 
 def read_trace(path: Path) -> Trace:
@@ -188,23 +191,23 @@ def _trace_of(columns: Mapping[str, Any]) -> Trace:
 
 
 def _check_name(path: Path) -> None:
-    """Refuse at the start of a run what would lose its trace at the end."""
+    """Check at the start of a run that the trace can be written at its end."""
     if path.suffix not in {".csv", ".npz"}:
         raise TraceError(f"{path}: the name of a trace must end in .csv or .npz")
     if path.is_dir():
         raise TraceError(f"{path}: is a folder; choose another name")
     if path.suffix == ".npz":
         try:
-            import numpy  # noqa: F401, PLC0415, ICN001  # whether it can be imported; only npz needs it
+            import numpy  # noqa: F401, PLC0415, ICN001  # check whether it can be imported; only npz needs it
         except ImportError:
             raise TraceError(
-                f"{path}: .npz needs numpy; name a .csv file, or run: pip install 'seventh-axis[planner]'"
+                f"{path}: .npz needs numpy; choose a .csv file, or run: pip install 'seventh-axis[planner]'"
             ) from None
 
 
 def _pack(source: Path, path: Path) -> None:
-    """Write a trace as npz, and remove the CSV that it was."""
-    import numpy as np  # noqa: PLC0415  # only who asks for npz needs numpy
+    """Write a trace as npz, and remove its CSV file."""
+    import numpy as np  # noqa: PLC0415  # needed only for npz
 
     trace = read_trace(source)._asdict()
     texts = {name: [_as_text(data) for data in trace[name]] for name in _BYTES}
@@ -241,7 +244,7 @@ def _read_npz(path: Path) -> "dict[str, NDArray[np.float64 | np.str_]]":
 
 
 def _as_text(data: bytes) -> str:
-    r"""Return bytes as printable ASCII: a carriage return reads `\r`."""
+    r"""Return bytes as printable ASCII: a carriage return is written as `\r`."""
     return data.decode("latin-1").encode("unicode_escape").decode("ascii")
 
 

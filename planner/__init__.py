@@ -1,51 +1,55 @@
-"""The scan planner: from a scan to configuration maps, to a plan, to a verified run on the table.
+"""The scan planner: from a scan to configuration maps, a plan, and a verified run on the table.
 
     scan = planner.load_scan("cylinder")
     planned = planner.plan(scan)
     finished = planner.run(planned, "emulator://", "build/run")
 
-Each name is loaded when it is first used, so that `import planner` takes no time.
+Each name is loaded at its first use, so that `import planner` is fast.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the imports that take long
+import protocol.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from planner.api import build_maps, plan, run, with_factors
+    from planner.api import build_maps, plan, run, tracker, with_factors
     from planner.cell.scan import Scan, load_scan
     from planner.errors import PlannerError
     from planner.execution.run import RunOptions
     from planner.kinematics.configuration import Configuration
     from planner.kinematics.value import RatedPoses, UserFactor
     from planner.map.config_map import ConfigurationMap
-    from planner.planning.plan import Infeasibility, NoPlan, Plan, make_plan
-    from planner.planning.problem import Problem
     from planner.planning.scan_planning import PlannedScan
+    from planner.plans.plan import Infeasibility, NoPlan, Plan, make_plan
+    from planner.plans.problem import Problem
+    from planner.tracking.tracker import Tracker, TrackSettings
 
 _HOME = {
     "Configuration": "planner.kinematics.configuration",
     "ConfigurationMap": "planner.map.config_map",
-    "Infeasibility": "planner.planning.plan",
-    "NoPlan": "planner.planning.plan",
-    "Plan": "planner.planning.plan",
+    "Infeasibility": "planner.plans.plan",
+    "NoPlan": "planner.plans.plan",
+    "Plan": "planner.plans.plan",
     "PlannedScan": "planner.planning.scan_planning",
     "PlannerError": "planner.errors",
-    "Problem": "planner.planning.problem",
+    "Problem": "planner.plans.problem",
     "RatedPoses": "planner.kinematics.value",
     "RunOptions": "planner.execution.run",
     "Scan": "planner.cell.scan",
+    "TrackSettings": "planner.tracking.tracker",
+    "Tracker": "planner.tracking.tracker",
     "UserFactor": "planner.kinematics.value",
     "build_maps": "planner.api",
     "load_scan": "planner.cell.scan",
-    "make_plan": "planner.planning.plan",
+    "make_plan": "planner.plans.plan",
     "plan": "planner.api",
     "run": "planner.api",
+    "tracker": "planner.api",
     "with_factors": "planner.api",
 }
-"""Where each public name comes from."""
+"""The module of each public name."""
 
 __all__ = [
     "Configuration",
@@ -59,12 +63,15 @@ __all__ = [
     "RatedPoses",
     "RunOptions",
     "Scan",
+    "TrackSettings",
+    "Tracker",
     "UserFactor",
     "build_maps",
     "load_scan",
     "make_plan",
     "plan",
     "run",
+    "tracker",
     "with_factors",
 ]
 

@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _status_of(chosen: argparse.Namespace) -> int:
     if getattr(chosen, "configuration", "all") not in {"all", "best"}:
-        Configuration.parse(chosen.configuration)  # a misspelt name is refused before what takes long is loaded
+        Configuration.parse(chosen.configuration)  # a misspelled name is refused before slow modules are loaded
     return int(import_module(f"planner.commands.{chosen.command.replace('-', '_')}").run(chosen))
 
 

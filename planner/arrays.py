@@ -1,4 +1,4 @@
-"""Names for the array types that signatures use; the shapes stand in the docstrings."""
+"""Names for the array types in signatures. The docstrings state the shapes."""
 
 import numpy as np
 import numpy.typing as npt

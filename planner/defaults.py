@@ -1,11 +1,11 @@
-"""What a user can choose by name, and what holds where nothing else is asked: known without loading what uses it."""
+"""Names that a user can choose, and default values; this module loads none of the code behind them."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
 SCANS = Path(__file__).with_name("scans")
-"""The folder of the scans that come with the planner."""
+"""The folder of the shipped scans."""
 
 DYNAMIC_PROGRAMMING = "dynamic_programming"
 RECEDING = "receding"
@@ -26,15 +26,15 @@ PLANNER_NAMES = (
 DEFAULT_PLANNER = DYNAMIC_PROGRAMMING
 
 DEFAULT_ANGLES = 360
-"""Table angles of a map over one turn."""
+"""Number of table angles of a map over one turn."""
 
 PART_CLASSES = ("block", "cylinder", "mould", "sphere")
 PATTERN_NAMES = ("crossed", "helix", "meridians", "raster", "rings", "spiral", "tilted")
 AXES = ("x", "-x", "y", "-y", "z", "-z")
-"""Axes of a mesh file that can point up."""
+"""Axes of a mesh file that may point up."""
 
 MILLIMETERS: Mapping[str, float] = MappingProxyType({"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4})
-"""The units of length that a mesh file may be in, in mm."""
+"""The units of length of a mesh file, in mm."""
 
 LAG_S = 0.0035
 """Lag of the encoder behind the reference: the lag of the emulator's speed loop."""
@@ -42,7 +42,7 @@ LEAD_S = 0.0
 TOLERANCE_DEG = 0.25
 """Allowed deviation of the encoder at a location."""
 RUN_ON_DEG = 90.0
-"""How far the table may run on when the line dies."""
+"""Maximum angle that the table runs on if the line fails."""
 PROFILES_HZ = 25.0
 SHARE_SEEN = 0.99
 """Share of what can be seen that an adaptive scan sees."""
@@ -51,5 +51,5 @@ MOST_STRIPS = 200
 
 
 def shipped_scans() -> list[str]:
-    """Return the names of the scans that come with the planner."""
+    """Return the names of the shipped scans."""
     return sorted(file.stem for file in SCANS.glob("*.toml"))

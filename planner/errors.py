@@ -1,7 +1,8 @@
-"""The errors that the planner raises for input that cannot be used.
+"""The errors that the planner raises for invalid input.
 
-Each says in one sentence what is wrong, where, and what is allowed, so that a command line can print it as it is.
-What a sound input merely cannot achieve (no arm solution, no plan) is a result with a reason and never one of these.
+Each message is one sentence with the problem, its place, and the allowed values, so that a command line can print it
+directly. If valid input has no result (no arm solution, no plan), that is a result with a reason, not one of these
+errors.
 """
 
 
@@ -10,11 +11,11 @@ class PlannerError(Exception):
 
 
 class ArmTableError(PlannerError):
-    """A table of arm parameters that the closed-form kinematics do not cover, or that contradicts itself."""
+    """A table of arm parameters that the closed-form kinematics do not cover, or that is inconsistent."""
 
 
 class ConfigurationNameError(PlannerError):
-    """A name that is none of the eight arm configurations."""
+    """A name that is not one of the eight arm configurations."""
 
 
 class PoseError(PlannerError):
@@ -22,12 +23,12 @@ class PoseError(PlannerError):
 
 
 class ScanFileError(PlannerError):
-    """A scan file, or another TOML file, with a key, a value or a shape that is not allowed."""
+    """A scan file or another TOML file with a key, a value or a shape that is not allowed."""
 
 
 class PathError(PlannerError):
-    """A scan path, or a file of one, that the probe cannot follow."""
+    """A scan path, or its file, that the probe cannot follow."""
 
 
 class WorkpieceError(PlannerError):
-    """A workpiece whose shape or size cannot be meant."""
+    """A workpiece with an implausible shape or size."""

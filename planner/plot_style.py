@@ -1,6 +1,6 @@
-"""The one style of all pictures: colors that color-blind readers tell apart, lines, fonts, sizes, files.
+"""The common style of all plots: colors for color-blind readers, lines, fonts, sizes, files.
 
-The colors are those of Okabe and Ito. Curves that may lie upon each other differ in line style too. Axes are labeled
+The colors are those of Okabe and Ito. Curves that may overlap have different line styles too. Axes are labeled
 `quantity (unit)`. The same figure gives the same bytes.
 """
 
@@ -21,11 +21,11 @@ DPI = 130
 WIDTH_IN = 9.6
 
 PLANNED: dict[str, Any] = {"color": "#f4a26a", "linewidth": 5.5}
-"""What was asked for: a wide, pale line."""
+"""A planned value: a wide, pale line."""
 EXECUTED: dict[str, Any] = {"color": BLUE, "linewidth": 1.3}
-"""What was done: a narrow, dark line upon it."""
+"""An actual value: a narrow, dark line over it."""
 LIMIT: dict[str, Any] = {"color": GRAY, "linewidth": 0.8, "linestyle": "--"}
-"""A bound of what is drawn."""
+"""A limit of a plotted value."""
 
 _SETTINGS: dict[Any, Any] = {
     "svg.hashsalt": "seventh-axis",
@@ -54,20 +54,20 @@ _SETTINGS: dict[Any, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw in this style; a decorator of functions that make figures too."""
+    """Draw in this style; also a decorator of functions that make figures."""
     with mpl.rc_context(_SETTINGS):
         yield
 
 
 @styled()
 def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
-    """Return an empty figure whose parts find their places."""
+    """Return an empty figure with automatic layout."""
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
 @styled()
 def save_picture(figure: Figure, file: Path) -> None:
-    """Write a figure in the format of the file's ending; the file appears when it is whole."""
+    """Write a figure in the format of the file's suffix; the file appears when it is complete."""
     ending = file.suffix.lower()
     undated = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(ending)
     with whole_file(file) as partial:

@@ -1,11 +1,11 @@
-"""Planners and value factors that other packages bring, found by their entry points.
+"""Planners and value factors from other packages, found by their entry points.
 
 A package declares them in its pyproject.toml:
 
     [project.entry-points."seventh_axis.planners"]
     mine = "my_package.my_module:my_planner"
 
-Nothing of a package is imported before its plug-in is asked for by name.
+No module of a package is imported before its plug-in is requested by name.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ _WHAT = {PLANNER_GROUP: "planner", FACTOR_GROUP: "factor"}
 
 
 class PlugInError(PlannerError):
-    """A plug-in that is not there, cannot be loaded, or does not keep to its interface."""
+    """A plug-in that is missing, cannot be loaded, or violates its interface."""
 
 
 def plug_in_names(group: str) -> list[str]:
@@ -30,26 +30,26 @@ def plug_in_names(group: str) -> list[str]:
 
 
 def load_plug_in(group: str, name: str, others: Sequence[str] = ()) -> Any:  # noqa: ANN401  # checked by the caller
-    """Return what the entry point of that name refers to.
+    """Return the object of the entry point with that name.
 
     Args:
         group: PLANNER_GROUP or FACTOR_GROUP.
-        name: The plug-in.
-        others: Names that are allowed as well, for the message.
+        name: the plug-in.
+        others: other allowed names, for the message.
 
     Raises:
-        PlugInError: There is none of that name, two packages have one, or it cannot be imported.
+        PlugInError: there is no plug-in with that name, two packages have one, or it cannot be imported.
     """
     what, points = _WHAT[group], tuple(entry_points(group=group, name=name))
     if not points:
         known = [*others, *plug_in_names(group)]
         allowed = (
-            f"; there are {', '.join(known)}" if known else f"; no package with the entry point {group} is installed"
+            f"; allowed are {', '.join(known)}" if known else f"; no package with the entry point {group} is installed"
         )
-        raise PlugInError(f"{what} {name!r}: is not known{allowed}{did_you_mean(name, known)}")
+        raise PlugInError(f"{what} {name!r}: not found{allowed}{did_you_mean(name, known)}")
     if len({point.value for point in points}) > 1:
         packages = " and ".join(sorted(_package(point) for point in points))
-        raise PlugInError(f"{what} {name!r}: {packages} both bring one of that name; uninstall one of them")
+        raise PlugInError(f"{what} {name!r}: {packages} both provide this name; uninstall one of them")
     try:
         return points[0].load()
     except (Exception, SystemExit) as error:
@@ -57,7 +57,7 @@ def load_plug_in(group: str, name: str, others: Sequence[str] = ()) -> Any:  # n
 
 
 def failure(group: str, name: str, problem: str, error: BaseException) -> PlugInError:
-    """Return the error that says in one line what a plug-in raised."""
+    """Return the error for an exception of a plug-in, in one line."""
     message = " ".join(str(error).split())
     return PlugInError(f"{_WHAT[group]} {name!r}: {problem}: {type(error).__name__}{': ' if message else ''}{message}")
 

@@ -1,28 +1,28 @@
-"""Why a pose of the arm is forbidden, as one small code per pose.
+"""The reason why a pose of the arm is forbidden, as one small code per pose.
 
-The codes are written into maps and files, so a published number never changes its meaning. They are in groups with
-room between them: 0 allowed; 1 to 15 kinematics; 16 to 31 the value function; 32 and up collisions, one code for
-each pair of bodies that can meet.
+The codes are stored in maps and files, so a published number never changes its meaning. They are in groups with reserve
+between them: 0 allowed; 1 to 15 kinematics; 16 to 31 the value function; 32 and up collisions, one code for each pair
+of bodies that can collide.
 """
 
 from enum import IntEnum
 
 
 class Reason(IntEnum):
-    """Why a pose is forbidden; REACHED where it is not."""
+    """Why a pose is forbidden; REACHED if it is allowed."""
 
     REACHED = 0
     OUT_OF_REACH = 1
-    """The wrist center is nearer or farther than upper arm and forearm can put it."""
+    """The wrist center is closer or farther than upper arm and forearm can reach."""
     SINGULAR = 2
-    """A joint's angle is undefined: axes 4 and 6 coincide, or the wrist center lies on axis 1 (or on axis 2)."""
+    """The angle of a joint is undefined: axes 4 and 6 coincide, or the wrist center is on axis 1 (or on axis 2)."""
     JOINT_1_LIMIT = 3
     JOINT_2_LIMIT = 4
     JOINT_3_LIMIT = 5
     JOINT_4_LIMIT = 6
     JOINT_5_LIMIT = 7
     JOINT_6_LIMIT = 8
-    """Several joints may be beyond their limits; the one nearest the base is named."""
+    """Several joints may be beyond their limits; the one nearest to the base is named."""
 
     JOINT_1_SPEED = 9
     JOINT_2_SPEED = 10
@@ -30,12 +30,12 @@ class Reason(IntEnum):
     JOINT_4_SPEED = 12
     JOINT_5_SPEED = 13
     JOINT_6_SPEED = 14
-    """Between two steps of a joint path only; a pose on its own has no speed."""
+    """Only between two steps of a joint path; a single pose has no speed."""
 
     WRIST_TURN = 15
-    """Between two steps of a joint path only: on their nearest turns, joints 4 and 6 spin the flange once around."""
+    """Only between two steps of a joint path: the nearest turns of joints 4 and 6 rotate the flange by a full turn."""
 
     @property
     def label(self) -> str:
-        """The name as people write it: `joint 6 limit`."""
+        """The name as text: `joint 6 limit`."""
         return self.name.lower().replace("_", " ")

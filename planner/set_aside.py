@@ -1,7 +1,7 @@
-"""Results of an earlier command in the same folder: set aside when a command begins, so that none passes for its own.
+"""Set aside the results of an earlier command in the same folder, so that they are not taken for the new ones.
 
-What the earlier command wrote goes to the subfolder `previous` and replaces what lies there. So a command that is
-refused leaves no results in its folder, and none are lost.
+The files of the earlier command are moved to the subfolder `previous` and replace its content. So a refused command
+leaves no results in its folder, and none are lost.
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,8 +17,8 @@ def set_aside(folder: Path, names: Iterable[str], keep: Sequence[Path] = ()) -> 
 
     Args:
         folder: the folder; it need not exist.
-        names: what the command writes there.
-        keep: files that the command reads; they stay where they are.
+        names: files that the command writes there.
+        keep: files that the command reads; they are not moved.
 
     Raises:
         PlannerError: one of `keep` would be overwritten, or a file cannot be moved.
@@ -30,7 +30,7 @@ def set_aside(folder: Path, names: Iterable[str], keep: Sequence[Path] = ()) -> 
         return
     for file in keep:
         if file.exists() and aside.exists() and file.resolve().parent == aside.resolve():
-            raise PlannerError(f"{file}: is among the former results of {folder}; write to another folder with --out")
+            raise PlannerError(f"{file}: belongs to the former results in {folder}; choose another folder with --out")
     try:
         aside.mkdir(exist_ok=True)
         for name in names:
@@ -38,4 +38,4 @@ def set_aside(folder: Path, names: Iterable[str], keep: Sequence[Path] = ()) -> 
         for file in found:
             file.replace(aside / file.name)
     except OSError as error:
-        raise PlannerError(f"{folder}: its former results cannot be set aside ({error.strerror or error})") from error
+        raise PlannerError(f"{folder}: cannot set aside the former results ({error.strerror or error})") from error

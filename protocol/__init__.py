@@ -1,4 +1,4 @@
-"""The wire between a client and the rotary table."""
+"""The serial protocol between a client and the rotary table."""
 
 import protocol.quiet_start  # noqa: F401 - first, see there
 

@@ -1,4 +1,4 @@
-"""The bench: what can be seen of a table, and done to it, besides talking to it on the wire.
+"""The bench: observe a table, and act on it, without the serial line.
 
 An emulated table in this process is a `SimulatedBench`. An emulator in another process has the bench of its
 `control_channel`. A real table has none.
@@ -12,7 +12,7 @@ from protocol.errors import TableError
 
 
 class BenchError(TableError):
-    """Something beside the wire did not work; the message says what."""
+    """An operation on the bench failed; the message names the cause."""
 
 
 class TableFacts(NamedTuple):
@@ -25,7 +25,10 @@ class TableFacts(NamedTuple):
 
 
 class TableStatus(NamedTuple):
-    """One look at a table. Angles are unwrapped; the true one is the table's own, behind the backlash."""
+    """The state of a table at one moment.
+
+    Angles are unwrapped. The true angle is that of the table itself, behind the backlash.
+    """
 
     tick: int
     reference_deg: float
@@ -43,8 +46,8 @@ class TableStatus(NamedTuple):
     transmit_queue: int  # bytes that have not left
     lost_bytes: int
     load_torque_Nm: float
-    shaft_deg: float  # what an encoder without steps would read on the motor's shaft
-    gap_deg: float  # by how much the shaft is ahead of the table: half the backlash at most, either way
+    shaft_deg: float  # position of the motor shaft, without quantization by the encoder
+    gap_deg: float  # angle by which the shaft is ahead of the table: at most half the backlash in either direction
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
@@ -52,18 +55,16 @@ class TableStatus(NamedTuple):
 class Fault:
     """A fault that can be injected. Each kind is a subclass with its own numbers, in `emulator.faults`.
 
-    The annotation of a number holds the closed interval that it must lie in, and its help.
+    The annotation of a number holds its allowed closed interval and its help text.
     """
 
     kind: ClassVar[str]
-    at_s: Annotated[float | None, 0.0, 1e9, "begins at this time since the table was switched on (default: now)"] = None
-    at_command: Annotated[
-        int | None, 1, 1e9, "begins with this command, counted from the first ever (default: now)"
-    ] = None
-    for_s: Annotated[float | None, 0.001, 1e9, "lasts so long (default: until it is cleared)"] = None
+    at_s: Annotated[float | None, 0.0, 1e9, "starts at this time since the table was switched on (default: now)"] = None
+    at_command: Annotated[int | None, 1, 1e9, "starts with this command, counted from power-on (default: now)"] = None
+    for_s: Annotated[float | None, 0.001, 1e9, "duration (default: until it is cleared)"] = None
 
     def __init_subclass__(cls, kind: str) -> None:
-        """Make a kind of fault a frozen value with a name, by which a person calls it."""
+        """Make a kind of fault a frozen dataclass with a name, which users give to select it."""
         cls.kind = kind
         dataclass(frozen=True, kw_only=True)(cls)
 
@@ -73,23 +74,23 @@ class Fault:
 
 
 Observer = Callable[[TableStatus, bytes, bytes], None]
-"""Called after each tick with the status, and the bytes that the firmware has read and that have left."""
+"""Called after each tick with the status, the bytes that the firmware has read, and the bytes that have been sent."""
 
 
 class GroundTruth(Protocol):
-    """A table that can be looked into and triggered."""
+    """A table whose state can be read and whose latch can be triggered."""
 
     def status(self) -> TableStatus:
-        """Return the table as it is at this moment."""
+        """Return the present state of the table."""
         ...
 
     def trigger(self) -> None:
-        """Latch the position at this moment, as the probe's signal does."""
+        """Latch the position now, as the probe's trigger signal does."""
         ...
 
 
 class Bench(GroundTruth, Protocol):
-    """The bench of any emulated table. Over a control channel each of these may raise a `BenchError`."""
+    """The bench of any emulated table. Over a control channel, each method may raise a `BenchError`."""
 
     @property
     def facts(self) -> TableFacts:
@@ -97,28 +98,28 @@ class Bench(GroundTruth, Protocol):
         ...
 
     def set_load_torque(self, torque_Nm: float) -> None:
-        """Load the table with a torque that resists positive rotation, until it is set anew."""
+        """Apply a load torque that opposes positive rotation, until the next call."""
         ...
 
     def reset(self, count: int = 0) -> None:
-        """Cut the table's power and switch it on again; its counter begins at `count`."""
+        """Cut the table's power and switch it on again; its counter starts at `count`."""
         ...
 
     def inject(self, fault: Fault) -> None:
-        """Let something go wrong, now or when the fault says."""
+        """Inject a fault, now or at the time that the fault specifies."""
         ...
 
     def clear_faults(self) -> None:
-        """End all faults, and forget those to come."""
+        """End all faults and cancel the scheduled ones."""
         ...
 
 
 @runtime_checkable
 class SimulatedBench(Bench, Protocol):
-    """A table in this process, whose time passes only when it is told.
+    """A table in this process. Its time passes only when the caller advances it.
 
     Attributes:
-        observer: who sees every tick, if anybody.
+        observer: called after every tick, if set.
     """
 
     observer: Observer | None
@@ -129,11 +130,14 @@ class SimulatedBench(Bench, Protocol):
         ...
 
     def trigger(self, fraction: float = 0.0) -> None:
-        """Put an edge on the trigger input, at a fraction (0..1) of the coming tick; the latch follows it."""
+        """Apply an edge to the trigger input at a fraction (0..1) of the coming tick.
+
+        The latch stores the position of that instant.
+        """
         ...
 
     def advance(self, ticks: int) -> None:
-        """Let simulated time pass."""
+        """Advance the simulated time."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""The client's end of the wire: one method for each verb, and waiting for arrival."""
+"""The client of the protocol: one method for each verb, and a wait for arrival."""
 
 from collections.abc import Callable
 from decimal import Decimal
@@ -15,27 +15,28 @@ POLL_INTERVAL_S = 0.05
 
 
 class TableClient:
-    """A rotary table at the other end of a port. Not for use by several threads at once.
+    """A rotary table at the other end of a port. It must not be used by several threads at once.
 
-    Leaving the `with` block closes the port; the motion that is running goes on. Every command raises a `TableError`
-    when the table or the line fails, and `ProtocolMisuse` for a number that cannot be sent. After a failure the
-    client can be used on: it makes sure of its place before the next command.
+    Leaving the `with` block closes the port; a running motion continues. Every command raises a `TableError` when the
+    table or the line fails, and `ProtocolMisuse` for a number that cannot be sent. The client can still be used after a
+    failure: it resynchronizes before the next command.
 
     Attributes:
         port: the port.
-        clock: the clock that the port carries, else the wall clock.
+        clock: the clock of the port if it has one, else the wall clock.
     """
 
     def __init__(
         self, port: Port, timeout_s: float = 1.0, decimals: int = 1, braking_deg_s2: float = BRAKING_DEG_S2
     ) -> None:
-        """Take over an open port; nothing is sent before the first command.
+        """Use an open port. Nothing is sent before the first command.
 
         Args:
-            port: an open pyserial port or its like; its read time-out is set here, its `clock` is used if it has one.
-            timeout_s: how long to wait for a reply.
+            port: an open pyserial port, or an object that behaves like one. Its read timeout is set here. Its `clock`
+                is used if it has one.
+            timeout_s: maximum time to wait for a reply.
             decimals: decimal places of the numbers sent.
-            braking_deg_s2: the greatest A to stop a table with that has not accepted one from this client.
+            braking_deg_s2: the maximum A that `stop` tries when the table has not yet accepted an A from this client.
         """
         self.port = port
         self._braking_deg_s2 = braking_deg_s2
@@ -44,14 +45,14 @@ class TableClient:
 
     @classmethod
     def open(cls, url: str, baud: int = 9600, timeout_s: float = 1.0, decimals: int = 1) -> Self:
-        """Open a device or any URL of pyserial's: `/dev/ttyUSB0`, `rfc2217://localhost:7000`.
+        """Open a device or any pyserial URL, such as `/dev/ttyUSB0` or `rfc2217://localhost:7000`.
 
-        Once the package `emulator` is imported, `emulator://` too.
+        `emulator://` works too, once the package `emulator` is imported.
 
         Raises:
             PortError: the port cannot be opened.
         """
-        # Here, since the emulator shares this package and starts without pyserial.
+        # Imported here because the emulator shares this package and starts without pyserial.
         from protocol.serial_port import open_serial_port  # noqa: PLC0415  # see above
 
         try:
@@ -75,43 +76,43 @@ class TableClient:
         self.port.close()
 
     def position_deg(self) -> float:
-        """Return the present position, as the encoder has it (H)."""
+        """Return the present position, as the encoder measures it (H)."""
         return float(self._read(Verb.READ_POSITION))
 
     def latched_deg(self) -> float:
-        """Return the position latched at the probe's last trigger (L)."""
+        """Return the position latched at the last trigger of the probe (L)."""
         return float(self._read(Verb.READ_LATCH))
 
     def move_to(self, angle_deg: float | Decimal) -> None:
-        """Start to move to a position on the unwrapped axis, replacing a motion that is running (P)."""
+        """Start a motion to a position on the unwrapped axis. It replaces a running motion (P)."""
         self._dialogue.exchange(Command(Verb.MOVE_TO, _decimal(angle_deg)))
 
     def move_by(self, angle_deg: float | Decimal) -> None:
-        """Start to move by an increment to the reference position, replacing a motion that is running (R)."""
+        """Start a motion by an increment to the reference position. It replaces a running motion (R)."""
         self._dialogue.exchange(Command(Verb.MOVE_BY, _decimal(angle_deg)))
 
     def set_speed(self, speed_deg_s: float | Decimal) -> None:
-        """Set the top speed from the next motion on (S)."""
+        """Set the maximum speed of the following motions (S)."""
         self._dialogue.exchange(Command(Verb.SET_SPEED, _decimal(speed_deg_s)))
 
     def set_acceleration(self, acceleration_deg_s2: float | Decimal) -> None:
-        """Set the acceleration from the next motion on (A)."""
+        """Set the acceleration of the following motions (A)."""
         self._dialogue.exchange(Command(Verb.SET_ACCELERATION, _decimal(acceleration_deg_s2)))
 
     def stop(self) -> float:
-        """Brake with the greatest A that the table has accepted, wait until it stands, and return where (H).
+        """Brake with the maximum A that the table has accepted, wait for standstill, and return the position (H).
 
-        See `protocol.stopping`. S and A are those of before afterwards, where they are known.
+        See `protocol.stopping`. Afterwards S and A have their former values, if those are known.
 
         Raises:
-            NotStopped: it was not seen to stand; the message says why, and what it will do.
+            NotStopped: standstill was not observed. The message states why, and what the table will do.
         """
         return stop(self._dialogue, self._braking_deg_s2)
 
     def stop_and_report(self) -> str:
-        """Stop the table, and return in words where it stands, or why it may not stand and what it will do."""
+        """Stop the table. Return as text where it stands, or why it may still move and what it will do."""
         try:
-            return f"the table was stopped, and stands at {self.stop():.6g} deg"
+            return f"the table was stopped and stands at {self.stop():.6g} deg"
         except TableError as error:
             return str(error)
 
@@ -122,18 +123,18 @@ class TableClient:
         timeout_s: float = 60.0,
         progress: Callable[[float], None] | None = None,
     ) -> float:
-        """Poll the position until two readings in a row are within the tolerance, and return the last.
+        """Poll the position until two consecutive readings are within the tolerance, and return the last one.
 
-        One reading could be that of a table which passes by.
+        A single reading could come from a table that passes the target.
 
         Args:
-            angle_deg: where the table is expected.
-            tolerance_deg: the greatest difference that counts as being there.
-            timeout_s: how long to wait.
+            angle_deg: expected position of the table.
+            tolerance_deg: maximum difference that counts as arrived.
+            timeout_s: maximum time to wait.
             progress: called with each position read.
 
         Raises:
-            ArrivalTimeout: the table is not there in time; it is not stopped.
+            ArrivalTimeout: the table did not arrive in time. It is not stopped.
         """
         target, tolerance = _decimal(angle_deg), _decimal(tolerance_deg)
         deadline_s = self.clock.now_s() + timeout_s
@@ -148,7 +149,7 @@ class TableClient:
                 return float(position)
             if self.clock.now_s() >= deadline_s:
                 raise ArrivalTimeout(
-                    f"waited {timeout_s:g} s for {target} +- {tolerance} deg, the table stands at {position} deg;"
+                    f"waited {timeout_s:g} s for {target} +- {tolerance} deg; the table is at {position} deg;"
                     " check that it was sent there and turns freely, or allow more time",
                     float(position),
                 )
@@ -161,7 +162,7 @@ class TableClient:
 
 
 def _decimal(value: float | Decimal) -> Decimal:
-    """Return a number as its user wrote it: 12.35 is 12.35, not the binary fraction next to it."""
+    """Return a number as its user wrote it: 12.35 stays 12.35, not the nearest binary fraction."""
     number = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
     if not number.is_finite():
         raise ProtocolMisuse(f"{value} is not a finite number")

@@ -1,7 +1,7 @@
 """A digest of what a function computes: its byte code, and whatever that reads, in all files that it comes from.
 
-Comments, docstrings, names of files and numbers of lines are no part of it. Machine code that is kept under this
-digest is therefore compiled anew when, and only when, something has changed that it was made from.
+Comments, docstrings, file names and line numbers do not belong to it. So machine code stored under this digest is
+compiled again exactly when its source has changed.
 """
 
 import dis
@@ -13,7 +13,7 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 _KNOWN_BY_VERSION = frozenset({"builtins", "llvmlite", "math", "numba", "numpy", "operator", "typing"})
-"""Packages whose parts are known by their names: whoever keeps something under a digest adds their versions."""
+"""Packages that are identified by their names. Code that stores something under a digest adds their versions."""
 
 _LOADS_GLOBAL = frozenset({"LOAD_GLOBAL", "LOAD_NAME"})
 _CONSTANT = (enum.Enum, tuple, list, frozenset, bool, int, float, complex, str, bytes, type(None), type(Ellipsis))
@@ -45,7 +45,7 @@ class _Walk:
         self._met: dict[int, int] = {}
 
     def parts(self, value: Any) -> Iterator[str]:  # noqa: ANN401  # whatever a function may read
-        """Yield texts that tell a value from all others."""
+        """Yield texts that distinguish a value from all others."""
         function = getattr(value, "py_func", value)  # of a compiled function, its source
         if isinstance(value, _CONSTANT):
             yield from self._constant_parts(value)

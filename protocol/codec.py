@@ -1,7 +1,7 @@
-"""Between messages and lines, both ways, without I/O.
+"""Convert messages to lines and lines to messages, without I/O.
 
-A line that comes from outside is judged, never trusted: a bad command is a result (the error that the table answers),
-a bad reply is the peer's fault (`UnexpectedReply`). What this program itself gets wrong is `ProtocolMisuse`.
+A line from outside is checked, never trusted. A malformed command is a result: the error that the table sends. A
+malformed reply is an error of the other side (`UnexpectedReply`). An error of this program is `ProtocolMisuse`.
 """
 
 import re
@@ -20,10 +20,10 @@ _EXACT = Context(prec=LINE_LIMIT, rounding=ROUND_HALF_EVEN, traps=[InvalidOperat
 
 
 def encode_command(command: Command, decimals: int = 1) -> bytes:
-    """Return the line that says `command`, with its CR; the number is rounded to `decimals` places.
+    """Return the line for `command`, with its CR. The number is rounded to `decimals` places.
 
     Raises:
-        ProtocolMisuse: a number where none belongs or none where one does, not finite, or too long for a line.
+        ProtocolMisuse: a number is missing, not expected, not finite, or too long for a line.
     """
     if VERBS[command.verb].takes_number != (command.value is not None):
         wanted = "exactly one number" if VERBS[command.verb].takes_number else "no number"
@@ -34,9 +34,9 @@ def encode_command(command: Command, decimals: int = 1) -> bytes:
 
 
 def decode_command(line: bytes) -> Command | ErrorCode:
-    """Return the command that `line` (without its CR) says, or the error to answer.
+    """Return the command in `line` (without its CR), or the error to send.
 
-    Only the form is judged; whether a number is within the table's range is for the table to say.
+    Only the form is checked. The table checks whether a number is within its range.
     """
     verb = _VERB_OF_LETTER.get(line[:1])
     if verb is None:
@@ -50,15 +50,15 @@ def decode_command(line: bytes) -> Command | ErrorCode:
 
 
 def encode_reply(reply: Reply, decimals: int = 1) -> bytes:
-    """Return the line that says `reply`, with its CR; an angle is rounded to `decimals` places.
+    """Return the line for `reply`, with its CR. An angle is rounded to `decimals` places.
 
     Raises:
-        ProtocolMisuse: an angle that is not finite, too long for a line, or of a verb that reads none.
+        ProtocolMisuse: the angle is not finite or too long for a line, or the verb does not read an angle.
     """
     match reply:
         case Angle(verb, angle_deg):
             if VERBS[verb].reply is not Angle:
-                raise ProtocolMisuse(f"{verb.name} ({verb}) is not answered with an angle")
+                raise ProtocolMisuse(f"{verb.name} ({verb}) does not read an angle")
             return _line(f"{verb} {_fixed_point(angle_deg, decimals)}")
         case Ok():
             return _line("OK")
@@ -67,13 +67,13 @@ def encode_reply(reply: Reply, decimals: int = 1) -> bytes:
 
 
 def decode_reply(line: bytes) -> Reply:
-    """Return the reply that `line` (without its CR) says.
+    """Return the reply in `line` (without its CR).
 
-    An angle needs its point and a digit after it: that unmasks most replies that lost their tail. The words after an
-    error's number are free, and spaces before the CR are allowed: Table 1 can be read as having them.
+    An angle needs a decimal point and a digit after it: most replies that lost their end are detected this way. The
+    text after an error number is free. Spaces before the CR are allowed, because Table 1 can be read as having them.
 
     Raises:
-        UnexpectedReply: the line is none of the protocol's replies.
+        UnexpectedReply: the line is not a reply of the protocol.
     """
     text = line.rstrip(b" ")
     if text == b"OK":
@@ -82,7 +82,7 @@ def decode_reply(line: bytes) -> Reply:
         return Angle(_VERB_OF_LETTER[angle[1]], Decimal(angle[2].decode()))
     if refusal := _REFUSAL.fullmatch(text):
         return Refusal(ErrorCode(int(refusal[1])))
-    raise UnexpectedReply(f"{line!r} is no reply of the table's protocol")
+    raise UnexpectedReply(f"{line!r} is not a reply of the protocol")
 
 
 def _fixed_point(value: Decimal, decimals: int) -> str:

@@ -1,7 +1,7 @@
-"""The client of an emulator's control channel: a line of JSON each way, over a Unix socket.
+"""The client of an emulator's control channel: JSON lines in both directions over a Unix socket.
 
-A request is `{"command": NAME, PARAMETER: NUMBER, ...}`. Its answer is `{"ok": true, ...}` or
-`{"ok": false, "error": SENTENCE}`. `emulator.server.control_commands` has the commands.
+A request is `{"command": NAME, PARAMETER: NUMBER, ...}`. Its reply is `{"ok": true, ...}` or `{"ok": false, "error":
+SENTENCE}`. `emulator.server.control_commands` defines the commands.
 """
 
 import json
@@ -13,7 +13,7 @@ from protocol.bench import BenchError, Fault, TableFacts, TableStatus
 from protocol.clock import WallClock
 
 TIMEOUT_S = 5.0
-"""How long an answer may take, to its last byte."""
+"""Maximum time until the last byte of a reply."""
 
 _LONGEST_ANSWER = 1 << 16
 
@@ -21,10 +21,11 @@ _Seen = TypeVar("_Seen", bound=NamedTuple)
 
 
 def request(path: Path, command: str, timeout_s: float = TIMEOUT_S, **parameters: float) -> dict[str, Any]:
-    """Return what the answer to one command says beyond `ok`.
+    """Return the fields of the reply to one command, without `ok`.
 
     Raises:
-        BenchError: nobody answers at `path` in time, something else answers there, or the request is refused.
+        BenchError: no reply from `path` in time, the reply is not from an emulator, or the emulator refuses the
+            request.
     """
     line = json.dumps({"command": command, **parameters}).encode() + b"\n"
     try:
@@ -44,10 +45,10 @@ class ControlChannel:
 
     Args:
         path: the emulator's control socket.
-        timeout_s: how long an answer may take.
+        timeout_s: maximum time for a reply.
 
     Raises:
-        BenchError: no emulator answers there.
+        BenchError: no emulator replies there.
     """
 
     def __init__(self, path: Path, timeout_s: float = TIMEOUT_S) -> None:
@@ -60,31 +61,31 @@ class ControlChannel:
         return self._seen(TableFacts, "facts")
 
     def status(self) -> TableStatus:
-        """Return the table as it is at this moment."""
+        """Return the present state of the table."""
         return self._seen(TableStatus, "state")
 
     def trigger(self) -> None:
-        """Latch the position at this moment, as the probe's signal does."""
+        """Latch the position now, as the probe's trigger signal does."""
         self._request("trigger")
 
     def set_load_torque(self, torque_Nm: float) -> None:
-        """Load the table with a torque that resists positive rotation, until it is set anew."""
+        """Apply a load torque that opposes positive rotation, until the next call."""
         self._request("load-torque", torque_Nm=torque_Nm)
 
     def reset(self, count: int = 0) -> None:
-        """Cut the table's power and switch it on again; its counter begins at `count`."""
+        """Cut the table's power and switch it on again; its counter starts at `count`."""
         self._request("preset", count=count)
 
     def inject(self, fault: Fault) -> None:
-        """Let something go wrong, now or when the fault says."""
+        """Inject a fault, now or at the time that the fault specifies."""
         self._request(f"fault-{fault.kind}", **fault.numbers())
 
     def clear_faults(self) -> None:
-        """End all faults, and forget those to come."""
+        """End all faults and cancel the scheduled ones."""
         self._request("clear-faults")
 
     def set_time_scale(self, time_scale: float) -> None:
-        """Let simulated time pass at another rate: simulated seconds in a real one."""
+        """Set the time scale: simulated time divided by real time."""
         self._request("time-scale", time_scale=time_scale)
 
     def quit(self) -> None:
@@ -95,7 +96,7 @@ class ControlChannel:
         return request(self._path, command, self._timeout_s, **parameters)
 
     def _seen(self, kind: type[_Seen], command: str) -> _Seen:
-        """Return what an answer shows of the table, once each value is of the type that belongs there."""
+        """Return the status in a reply. Each value must have the type of its field."""
         fields = self._request(command)
         values = [fields.get(name) for name in kind._fields]
         for value, wanted in zip(values, kind.__annotations__.values(), strict=True):
@@ -105,7 +106,7 @@ class ControlChannel:
 
 
 def _exchange(path: Path, line: bytes, timeout_s: float) -> bytes:
-    """Send a line and return the answer, to its line feed or as far as it came."""
+    """Send a line, and return the reply up to its line feed, or the part that was received."""
     clock, answer = WallClock(), b""
     deadline_s = clock.now_s() + timeout_s
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
@@ -123,7 +124,7 @@ def _exchange(path: Path, line: bytes, timeout_s: float) -> bytes:
 
 
 def _fields_of(reply: bytes) -> dict[str, Any]:
-    """Return the fields of an answer; none where it is no JSON object."""
+    """Return the fields of a reply; none if it is not a JSON object."""
     try:
         fields = json.loads(reply)
     except (ValueError, RecursionError):
@@ -133,5 +134,5 @@ def _fields_of(reply: bytes) -> dict[str, Any]:
 
 def _no_answer(path: Path, reply: bytes) -> BenchError:
     if not reply:
-        return BenchError(f"{path}: the emulator closed the connection without an answer")
-    return BenchError(f"{path}: {reply[:80]!r} is not an answer of an emulator; is this its control channel?")
+        return BenchError(f"{path}: the emulator closed the connection without a reply")
+    return BenchError(f"{path}: {reply[:80]!r} is not a reply of an emulator; is this its control channel?")

@@ -1,4 +1,4 @@
-"""Read JSON and TOML files that people write or that come from elsewhere: whatever is wrong is one sentence."""
+"""Read JSON and TOML files that users write or other programs produce. Each error is one sentence."""
 
 import difflib
 import json
@@ -9,21 +9,21 @@ from typing import Any
 
 _MB = 1024 * 1024
 _LARGEST_BYTES = 256 * _MB
-_LARGEST_TOML_BYTES = _MB  # people write it
+_LARGEST_TOML_BYTES = _MB  # users write it
 _LONGEST_VALUE = 80
 
 
 class DataFileError(ValueError):
-    """A file that cannot be used; the message names it and says why."""
+    """A file that cannot be used. The message names the file and the reason."""
 
 
 def read_text(path: Path, largest_bytes: int = _LARGEST_BYTES) -> str:
     """Return a text file in UTF-8, with or without a byte order mark.
 
-    A device or a pipe, whose size nobody knows beforehand, is read up to the limit.
+    A device or a pipe has no known size; it is read up to the limit.
 
     Raises:
-        DataFileError: It cannot be read, is no text, or is too large.
+        DataFileError: the file cannot be read, is not text, or is too large.
     """
     try:
         with path.open("rb") as file:
@@ -38,20 +38,20 @@ def read_text(path: Path, largest_bytes: int = _LARGEST_BYTES) -> str:
         raise DataFileError(f"{path}: cannot be read: {reason or error}") from error
 
 
-def read_json(path: Path) -> Any:  # noqa: ANN401 - whatever the file holds
-    """Return what a JSON file holds; see `read_text`. NaN and infinity are not JSON."""
+def read_json(path: Path) -> Any:  # noqa: ANN401 - any content of the file
+    """Return the content of a JSON file; see `read_text`. NaN and infinity are not JSON."""
     return _parsed(read_text(path), path, "JSON", lambda text: json.loads(text, parse_constant=_no_number))
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Return what a TOML file holds; see `read_text`."""
+    """Return the content of a TOML file; see `read_text`."""
     text = read_text(path, _LARGEST_TOML_BYTES)
     values: dict[str, Any] = _parsed(text, path, "TOML", tomllib.loads)
     return values
 
 
 def shown(value: object) -> str:
-    """Return a value as it is shown in a message, shortened where it is long."""
+    """Return a value as text for a message, shortened if it is long."""
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # an integer of thousands of digits, or very deep nesting
@@ -60,14 +60,14 @@ def shown(value: object) -> str:
 
 
 def shortened(text: str) -> str:
-    """Return a text as it is shown in a message, cut where it is long."""
+    """Return a text for a message, cut if it is long."""
     return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}..."
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return the end of a sentence that offers the known name nearest to an unknown one; empty where none is near.
+    """Return a suggestion of the known name nearest to an unknown one, or an empty text if no name is near.
 
-    Capitals are no difference.
+    Upper and lower case are equal.
     """
     folded = {each.casefold(): each for each in known}
     near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.7)
@@ -78,7 +78,7 @@ def _parsed(text: str, path: Path, kind: str, parse: Callable[[str], Any]) -> An
     try:
         return parse(text)
     except RecursionError as error:
-        raise DataFileError(f"{path}: is not {kind} that can be used: it is nested too deeply") from error
+        raise DataFileError(f"{path}: is not usable {kind}: it is nested too deeply") from error
     except ValueError as error:
         raise DataFileError(f"{path}: is not {kind}: {_one_line(error)}") from error
 

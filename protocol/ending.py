@@ -11,13 +11,13 @@ _BAD_INPUT = 2
 
 
 def ended(name: str, work: Callable[[], int], *expected: type[Exception], interrupted: str = "interrupted") -> int:
-    """Run a command and return its exit status; expected failures, and those of files, are one line and status 2.
+    """Run a command and return its exit status. Expected errors, including those of files, are one line and status 2.
 
     Args:
-        name: The command's, to begin that line with.
-        work: Returns the exit status.
-        expected: The errors that say what the user can do about them.
-        interrupted: What the line says after a signal.
+        name: name of the command, at the start of that line.
+        work: returns the exit status.
+        expected: the errors with a message for the user.
+        interrupted: text of the line after a signal.
     """
     try:
         with ended_by_signals() as ending:
@@ -29,7 +29,7 @@ def ended(name: str, work: Callable[[], int], *expected: type[Exception], interr
         return status_after(interrupt)
     except BrokenPipeError:
         give_up_stdout()
-        say(name, "nobody reads what it prints any more")
+        say(name, "stdout is closed")
         return _BAD_INPUT
     except Exception as error:
         if not isinstance(error, (*expected, OSError)):
@@ -49,7 +49,7 @@ def say(name: str, sentence: str) -> None:
 
 
 def give_up_stdout() -> None:
-    """Let what is still to be printed go nowhere: else the interpreter complains of it again when it ends."""
+    """Discard the output that is not yet printed: else the interpreter reports the error again at its exit."""
     with suppress(OSError, ValueError, AttributeError):
         sys.stdout.flush()
         return

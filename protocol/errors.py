@@ -1,44 +1,44 @@
-"""What can go wrong on the wire, as a small tree.
+"""The errors of the protocol, as a small tree.
 
-    TableError               the table, or the way to it, did not do its part
-    ├── PortError            the port cannot be opened, or has died
-    ├── ReplyTimeout         a reply did not come in time
-    ├── UnexpectedReply      what came is no answer to what was sent
+    TableError               the table, or the connection to it, failed
+    ├── PortError            the port cannot be opened, or failed
+    ├── ReplyTimeout         a reply was not received in time
+    ├── UnexpectedReply      the received line is not a reply to the command
     ├── CommandRefused       the table answered `ERR n text`
     ├── ArrivalTimeout       the table did not reach its target in time
-    └── NotStopped           the table was told to stop, and was not seen to stand
+    └── NotStopped           the table was commanded to stop; standstill was not observed
 
-    ProtocolMisuse           this program asked for what the protocol cannot say (a `ValueError`)
+    ProtocolMisuse           this program requested what the protocol cannot express (a `ValueError`)
 
-A `TableError` may pass when the line or the table is seen to; a `ProtocolMisuse` needs a change of the program.
+A `TableError` may be solved at the line or the table. A `ProtocolMisuse` needs a change of the program.
 """
 
-# ruff: noqa: N818 - named after what happened, so that an except clause reads as a sentence
+# ruff: noqa: N818 - names describe the event, so that an except clause reads as a sentence
 
 from protocol.messages import ErrorCode
 
 
 class TableError(Exception):
-    """The table, or the way to it, did not do its part."""
+    """The table, or the connection to it, failed."""
 
 
 class PortError(TableError):
-    """The port cannot be opened, or has died."""
+    """The port cannot be opened, or failed."""
 
 
 class ReplyTimeout(TableError):
-    """A reply did not come in time."""
+    """A reply was not received in time."""
 
 
 class UnexpectedReply(TableError):
-    """What came is no answer to what was sent."""
+    """The received line is not a reply to the command."""
 
 
 class CommandRefused(TableError):
     """The table refused a command, and changed nothing.
 
     Attributes:
-        code: why, in the table's words.
+        code: the reason, as the table's error code.
     """
 
     def __init__(self, message: str, code: ErrorCode) -> None:
@@ -50,7 +50,7 @@ class ArrivalTimeout(TableError):
     """The table did not reach its target in time.
 
     Attributes:
-        position_deg: where the table stood when it was last read.
+        position_deg: the last position of the table that was read.
     """
 
     def __init__(self, message: str, position_deg: float) -> None:
@@ -59,8 +59,11 @@ class ArrivalTimeout(TableError):
 
 
 class NotStopped(TableError):
-    """The table was told to stop, and was not seen to stand; the message says what it will do."""
+    """The table was commanded to stop, but standstill was not observed.
+
+    The message states what the table will do.
+    """
 
 
 class ProtocolMisuse(ValueError):
-    """This program asked for what the protocol cannot say."""
+    """This program requested something that the protocol cannot express."""

@@ -1,4 +1,4 @@
-"""The optional dependencies, by the extra that installs them: what is told where one is missing."""
+"""The optional dependencies and their extras, and the message for a missing one."""
 
 from collections.abc import Mapping
 from importlib.util import find_spec
@@ -12,18 +12,18 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "test": ("pytest", "xdist", "hypothesis", "ruckig", "py_opw_kinematics", "coal"),
     "completion": ("argcomplete",),
 }  # fmt: skip
-"""The modules of each extra; `tools` brings those of `planner` too, and `test` those of both."""
+"""The modules of each extra. `tools` includes those of `planner`, and `test` includes both."""
 
 _WITH_TOOLS = {"tools.tune", "tune"}
-"""What needs the extra `tools`, whichever of its modules is missed first."""
+"""Modules that need the extra `tools`, whichever import fails first."""
 
 
 def missing_extra(error: BaseException, *command: str) -> str:
-    """Return in one sentence which extra has the module that an import did not find; empty for any other error.
+    """Return one sentence with the extra that contains a missing module; empty for any other error.
 
     Args:
-        error: what the import raised.
-        command: the program that needs it, and its first word.
+        error: the exception of the import.
+        command: the program and its first argument.
     """
     if not isinstance(error, ModuleNotFoundError) or error.name is None:
         return ""

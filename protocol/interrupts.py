@@ -1,7 +1,7 @@
-"""Signals that end a program: how it learns of them, with which status it ends, and when they have to wait.
+"""Signals that end a program: how they are handled, when they are deferred, and the exit status.
 
-SIGINT (Ctrl-C), SIGTERM and SIGHUP all break into the main thread as a `KeyboardInterrupt`, so that a table in motion
-is stopped whichever came. A signal that was ignored when the program began (`nohup`, `&` in a script) stays ignored.
+SIGINT (Ctrl-C), SIGTERM and SIGHUP raise a `KeyboardInterrupt` in the main thread, so that each of them stops a moving
+table. A signal that was ignored at the start of the program (`nohup`, `&` in a script) stays ignored.
 """
 
 import signal
@@ -18,14 +18,14 @@ _Handler = Callable[[int, FrameType | None], object] | int | None
 
 
 class Interrupted(KeyboardInterrupt):
-    """A signal told the program to end; its argument is the number of the signal."""
+    """A signal requested the end of the program. The argument is the number of the signal."""
 
 
 class Ending:
-    """The signals that have come while `ended_by_signals` holds.
+    """The signals received within a block of `ended_by_signals`.
 
     Attributes:
-        number: of the first signal; None while none has come.
+        number: number of the first signal; None if no signal was received.
     """
 
     def __init__(self) -> None:
@@ -33,7 +33,7 @@ class Ending:
         self.is_handled = True
 
     def take(self, number: int, _: FrameType | None) -> None:
-        """Break into the program, once: what the first signal began is not to be cut short by a second one."""
+        """Interrupt the program once: a second signal must not interrupt the handling of the first one."""
         if self.number is None:
             self.number = number
         if self.is_handled:
@@ -41,7 +41,7 @@ class Ending:
             raise Interrupted(number)
 
     def status(self, otherwise: int) -> int:
-        """Return the exit status of a program: 128 and the number of the signal that ended it, else its own."""
+        """Return 128 plus the number of the signal that ended the program, else the program's own exit status."""
         return otherwise if self.number is None else 128 + self.number
 
 
@@ -50,11 +50,12 @@ _endings: list[Ending] = []
 
 @contextmanager
 def ended_by_signals() -> Iterator[Ending]:
-    """Let each of the signals break into the block as a KeyboardInterrupt; a block within another shares its signals.
+    """Turn each of the signals into a KeyboardInterrupt within the block. Nested blocks share their signals.
 
-    After the first, signals are dropped until a block of `signals_wait` has ended: a table that is being stopped then
-    stands. A signal that is ignored, or has a handler of the caller's own, keeps that. At the end all are put back; in
-    a program that a signal has ended, they are ignored, so that none changes its exit status while it is unloaded.
+    After the first signal, others are dropped until a block of `signals_wait` has ended: the table has been stopped
+    then. A signal that is ignored, or has a handler of the caller, keeps that handler. At the end all handlers are
+    restored. If a signal has ended the program, the signals are ignored, so that none changes the exit status during
+    shutdown.
     """
     if _endings:
         yield _endings[-1]
@@ -77,9 +78,9 @@ def ended_by_signals() -> Iterator[Ending]:
 
 @contextmanager
 def signals_wait() -> Iterator[None]:
-    """Keep the signals until the block is done. While an interrupt is being handled, they are dropped."""
+    """Defer the signals until the block ends. While an interrupt is being handled, they are dropped."""
     if not _is_main_thread():
-        yield  # no signal is handled here
+        yield  # signals are not handled here
         return
     is_ending = isinstance(sys.exception(), KeyboardInterrupt)
     kept: list[int] = []
@@ -100,12 +101,12 @@ def signals_wait() -> Iterator[None]:
 
 
 def said(error: BaseException, message: str = "") -> str:
-    """Return an error's message, or another in its place, and its notes, in one line."""
+    """Return the message of an error, or a replacement for it, and its notes, in one line."""
     return "; ".join([message or str(error), *getattr(error, "__notes__", ())])
 
 
 def status_after(interrupt: KeyboardInterrupt) -> int:
-    """Return the exit status of a program that a signal has ended: 128 and its number."""
+    """Return the exit status of a program that a signal has ended: 128 plus the signal's number."""
     number = interrupt.args[0] if isinstance(interrupt, Interrupted) else signal.SIGINT
     return 128 + int(number)
 

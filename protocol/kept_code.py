@@ -1,18 +1,19 @@
 """Machine code that is kept between runs: a file for each function and the types of its arguments.
 
-A file's name holds the digest of everything that the code was made from (`code_digest`), so a change of it is a new
-file, and a change of a comment is not.
+A file's name contains the digest of everything that determines the code (`code_digest`). So a change of the code gives
+a new file, and a change of a comment does not.
 """
 
 import sys
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from protocol.code_digest import NoDigestError, code_digest
-from protocol.kept_file import KERNEL, cache_root, keep_file, load_file
+from protocol.kept_file import KERNEL, cache_root, keep_file, load_file, made_by_one
 
 _LAYOUT = "3"
 """Raised when machine code is made or written in another way: code of a former layout is then never loaded."""
@@ -49,6 +50,11 @@ def load_code(name: str) -> bytes | None:
 def keep_code(name: str, code: bytes) -> None:
     """Keep machine code under a name, if the folder allows it."""
     keep_file(code_folder() / f"{name}{KERNEL}", code)
+
+
+def compiled_by_one(name: str) -> AbstractContextManager[None]:
+    """Let one process at a time compile what is kept under a name; see `made_by_one`."""
+    return made_by_one(code_folder() / f"{name}{KERNEL}")
 
 
 @cache

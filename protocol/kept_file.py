@@ -1,28 +1,36 @@
 """Files with what can be computed again, kept between runs for all checkouts and versions of a user.
 
-A file's name says what it was computed from, so it is never stale, and any number of processes may write and read it at
-once. What is read steers machines, and machine code runs without further checks: a file is used only if it is whole,
-was written under its name, and belongs to this user, whom alone it lets write. Else, or where the folder cannot be read
-or written, or is full, its content is computed again: that costs time only.
+A file's name identifies the input of its computation, so it is never stale. Any number of processes may write and read
+it at once. The content controls machines, and machine code runs without further checks. So a file is used only if it is
+complete, was written under its name, belongs to this user, and is not writable for others. Otherwise, or if the folder
+cannot be used or is full, the content is computed again, which costs only time.
 """
 
 import hashlib
 import os
 import stat
+import sys
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
 from protocol.whole_file import whole_file
+
+if sys.platform != "win32":  # there, several processes may make the same
+    import fcntl
 
 KERNEL = ".kernel"
 FIELD = ".field"
 UNUSED_DAYS = 60
 """A file that no run has used for so long is deleted when a new one is kept."""
 
-_SUFFIXES = (KERNEL, FIELD, ".nbi", ".nbc", ".npz")
+_SUFFIXES = (KERNEL, FIELD, ".lock", ".nbi", ".nbc", ".npz")
 """Of the files here, and in former layouts of the folder."""
+PATIENCE_S = 60.0
+"""How long to wait for another process that makes a file, but may have been suspended meanwhile."""
+_LOOK_S = 0.02
 _SEAL_BYTES = 32
 _DAY_S = 86_400.0
 _OPEN_FLAGS = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
@@ -64,6 +72,37 @@ def keep_file(file: Path, content: bytes) -> None:
         with whole_file(file) as partial:
             partial.chmod(0o600)
             partial.write_bytes(_seal(file.name, content) + content)
+
+
+@contextmanager
+def made_by_one(file: Path) -> Iterator[None]:
+    """Let one process at a time make a file; another one waits here, and should then look whether the file is there."""
+    claim = file.with_name(f"{file.name}.lock")
+    try:
+        claim.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(claim, os.O_RDWR | os.O_CREAT | _OPEN_FLAGS, 0o600)
+    except OSError:
+        yield
+        return
+    try:
+        _wait_for(descriptor)
+        yield
+    finally:
+        claim.unlink(missing_ok=True)
+        os.close(descriptor)
+
+
+def _wait_for(descriptor: int) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while sys.platform != "win32" and time.monotonic() < end_s:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(_LOOK_S)
+        except OSError:  # a file system without locks
+            return
+        else:
+            return
 
 
 @cache

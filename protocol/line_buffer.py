@@ -1,4 +1,4 @@
-"""From a stream of bytes to lines, in bounded memory."""
+"""Split a stream of bytes into lines, in bounded memory."""
 
 from protocol.messages import LINE_LIMIT, ErrorCode
 
@@ -6,20 +6,20 @@ _PRINTABLE = bytes(range(0x20, 0x7F))
 
 
 class LineBuffer:
-    """Cuts a stream of bytes into lines, one result for each line that is not empty.
+    """Splits a stream of bytes into lines, with one result for each line that is not empty.
 
-    A line ends in CR; LF is ignored wherever it stands. A line of spaces alone is empty. A faulty line gives the first
-    of its faults in place of its bytes. What comes out does not depend on how the stream was split.
+    A line ends with CR; LF is ignored everywhere. A line of spaces alone is empty. A faulty line gives its first fault
+    instead of its bytes. The result does not depend on how the stream was split.
     """
 
     def __init__(self, limit: int = LINE_LIMIT) -> None:
-        """Start at the beginning of a line of at most `limit` bytes."""
+        """Start at the beginning of a line with at most `limit` bytes."""
         self._limit = limit
         self._line = b""
         self._fault: ErrorCode | None = None
 
     def feed(self, data: bytes) -> list[bytes | ErrorCode]:
-        """Return the lines that end in `data`, in order, without their CR."""
+        """Return the lines that end within `data`, in order, without their CR."""
         *ends, beginning = data.translate(None, b"\n").split(b"\r")
         finished = []
         for end in ends:
@@ -32,12 +32,12 @@ class LineBuffer:
         return finished
 
     def discard(self) -> None:
-        """Forget the present half line: whoever began it has gone."""
+        """Discard the present incomplete line: its client has disconnected."""
         self._line = b""
         self._fault = None
 
     def spoil(self) -> None:
-        """Take note that bytes of the present line were lost: it must not pass for a whole one."""
+        """Record that bytes of the present line were lost: it must not count as complete."""
         if self._fault is None:
             self._fault = ErrorCode.BAD_BYTE
 

@@ -1,13 +1,15 @@
 """Compile functions with numba, and keep their machine code between runs under what they are (`code_digest`).
 
-Numba's own cache asks only whether the file of the *called* function has changed, so it would go on running old code of
-a function that is called in another file; and two processes that compile at once may exchange two signatures' code.
-This module needs numba; nothing imports it before something has to be compiled.
+Numba's own cache checks only whether the file of the *called* function has changed. So it would run old code of a
+function that is called in another file. Also two processes that compile at once may exchange the code of two
+signatures. This module needs numba; nothing imports it before something has to be compiled.
 """
 
+import gc
 import pickle
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from typing import Any
 
@@ -23,7 +25,7 @@ from numba.core.serialize import dumps
 from numba.extending import register_jitable
 
 from protocol.code_digest import NoDigestError, code_digest
-from protocol.kept_code import code_folder, code_name, keep_code, load_code
+from protocol.kept_code import code_folder, code_name, compiled_by_one, keep_code, load_code
 
 _types: Any = numba.core.types
 _OPTIONS = {"error_model": "numpy", "nogil": True}
@@ -39,7 +41,15 @@ FunctionIdentity._unique_ids = iter(partial(secrets.randbits, 63), 0)  # noqa: S
 def compiled(function: Callable[..., Any]) -> Any:  # noqa: ANN401  # numba's dispatcher
     """Return `function` compiled at its first call, or taken from an earlier run of the same code."""
     dispatcher = numba.njit(**_OPTIONS)(function)
-    dispatcher._cache = _KeptCode(function)  # noqa: SLF001  # as numba's `enable_caching` does
+    kept = _KeptCode(function)
+    dispatcher._cache = kept  # noqa: SLF001  # as numba's `enable_caching` does
+    compile_signature = dispatcher.compile
+
+    def compile_or_load(sig: Any) -> Any:  # noqa: ANN401  # numba's
+        with kept.compiling():
+            return compile_signature(sig)
+
+    dispatcher.compile = compile_or_load
     return dispatcher
 
 
@@ -49,7 +59,7 @@ def within_type(function: Callable[..., Any]) -> Any:  # noqa: ANN401  # numba's
 
 
 def inlined(function: Callable[..., Any]) -> None:
-    """Let numba compile a plain function where a compiled one calls it, in the place of the call."""
+    """Let numba compile a plain function into its compiled callers, instead of a call."""
     register_jitable(**_INLINED_OPTIONS)(function)
 
 
@@ -74,6 +84,19 @@ class _KeptCode(_Cache):  # type: ignore[misc]  # numba has no types
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
         self._compiling: str | None = None
+        self._turn = ExitStack()
+
+    @contextmanager
+    def compiling(self) -> Iterator[None]:
+        """Compile here, or wait for another process that does, without looking for garbage: a sixth of the time."""
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            yield
+        finally:
+            self._turn.close()
+            if collects:
+                gc.enable()
 
     @property
     def cache_path(self) -> str:
@@ -81,15 +104,14 @@ class _KeptCode(_Cache):  # type: ignore[misc]  # numba has no types
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:  # noqa: ANN401  # numba's
         target_context.refresh()
-        self._compiling = self._file_name(sig, target_context)
-        code = None if self._compiling is None else load_code(self._compiling)
-        if code is None:
+        self._compiling = name = self._file_name(sig, target_context)
+        if name is None:
             return None
-        try:
-            result = CompileResult._rebuild(target_context, *pickle.loads(code))  # noqa: S301, SLF001  # this user's, whole
-        except Exception:  # of whatever kind: what cannot be loaded is compiled
-            return None
-        return result if result.signature.args == _arguments(sig) else None
+        found = _loaded(name, sig, target_context)
+        if found is None:
+            self._turn.enter_context(compiled_by_one(name))
+            found = _loaded(name, sig, target_context)
+        return found
 
     def save_overload(self, sig: Any, data: Any) -> None:  # noqa: ANN401  # numba's
         """Keep what was compiled, under the name that was not found just before."""
@@ -118,6 +140,18 @@ class _KeptCode(_Cache):  # type: ignore[misc]  # numba has no types
         return None if name is None else f"{name}-{digest[:16]}"
 
 
+def _loaded(name: str, sig: Any, target_context: Any) -> Any:  # noqa: ANN401  # numba's
+    """Return what was kept under a name, ready to be called; None where that must be compiled."""
+    code = load_code(name)
+    if code is None:
+        return None
+    try:
+        result = CompileResult._rebuild(target_context, *pickle.loads(code))  # noqa: S301, SLF001  # this user's, whole
+    except Exception:  # of whatever kind: what cannot be loaded is compiled
+        return None
+    return result if result.signature.args == _arguments(sig) else None
+
+
 def _arguments(sig: Any) -> tuple[Any, ...]:  # noqa: ANN401  # numba's
     return tuple(getattr(sig, "args", sig))
 
@@ -143,7 +177,7 @@ _PLAIN_TYPES = (
 
 
 def _type_parts(kind: Any) -> tuple[Any, ...]:  # noqa: ANN401  # numba's
-    """Return what tells a type from all others."""
+    """Return a text that distinguishes a type from all others."""
     if isinstance(kind, _types.BaseTuple):
         named = (kind.instance_class.__module__, kind.instance_class) if isinstance(kind, _types.BaseNamedTuple) else ()
         return (type(kind).__name__, named, *map(_type_parts, kind.types))

@@ -1,6 +1,6 @@
-"""What is said on the wire: commands, replies, and the table of the verbs (Table 1 of the paper).
+"""The messages of the protocol: commands, replies, and the table of the verbs (Table 1 of the paper).
 
-Numbers are decimal, as they are on the wire, so that rounding is exact.
+Numbers are decimal, as in the protocol, so that rounding is exact.
 """
 
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from enum import IntEnum, StrEnum
 from types import MappingProxyType
 
 LINE_LIMIT = 32
-"""The longest line, in bytes, without its CR."""
+"""The maximum length of a line, in bytes, without its CR."""
 
 
 class Verb(StrEnum):
@@ -35,13 +35,13 @@ class ErrorCode(IntEnum):
 
     @property
     def text(self) -> str:
-        """The words that follow the code on the wire."""
+        """The text after the code in the reply."""
         return self.name.lower().replace("_", " ")
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One line to the table; `value` is in the verb's unit, and None for a verb that takes no number."""
+    """One line to the table. `value` is in the verb's unit, and None for a verb without a number."""
 
     verb: Verb
     value: Decimal | None = None
@@ -62,7 +62,7 @@ class Ok:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """The reply to a refused line, which changed nothing."""
+    """The reply to a refused line, which had no effect."""
 
     code: ErrorCode
 
@@ -72,7 +72,7 @@ Reply = Angle | Ok | Refusal
 
 @dataclass(frozen=True, slots=True)
 class VerbEntry:
-    """One row of Table 1: the number's unit (None: the verb takes none), the kind of reply, and the meaning."""
+    """One row of Table 1: the number's unit (None: no number), the kind of reply, and the meaning."""
 
     unit: str | None
     reply: type[Angle] | type[Ok]
@@ -80,7 +80,7 @@ class VerbEntry:
 
     @property
     def takes_number(self) -> bool:
-        """Whether exactly one number follows the letter, or none may."""
+        """Whether the verb takes exactly one number; else it takes none."""
         return self.unit is not None
 
 

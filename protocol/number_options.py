@@ -1,11 +1,11 @@
-"""The numbers that options of a command line take: each reader refuses others with what is allowed."""
+"""Numbers as command line options. Each reader refuses other values, and lists the allowed ones."""
 
 import argparse
 from collections.abc import Callable
 
 
 def whole_number(least: int, most: int) -> Callable[[str], int]:
-    """Return what reads a whole number within bounds."""
+    """Return the reader of a whole number within bounds."""
 
     def read(text: str) -> int:
         try:
@@ -13,14 +13,14 @@ def whole_number(least: int, most: int) -> Callable[[str], int]:
         except ValueError:
             number = least - 1
         if not least <= number <= most:
-            raise argparse.ArgumentTypeError(f"is {text}; allowed is a whole number from {least} to {most}")
+            raise argparse.ArgumentTypeError(f"is {text}; allowed: a whole number from {least} to {most}")
         return number
 
     return read
 
 
 def number(least: float, most: float) -> Callable[[str], float]:
-    """Return what reads a number within bounds."""
+    """Return the reader of a number within bounds."""
 
     def read(text: str) -> float:
         try:
@@ -28,20 +28,20 @@ def number(least: float, most: float) -> Callable[[str], float]:
         except ValueError:
             value = float("nan")
         if not least <= value <= most:
-            raise argparse.ArgumentTypeError(f"is {text}; allowed is a number from {least:g} to {most:g}")
+            raise argparse.ArgumentTypeError(f"is {text}; allowed: a number from {least:g} to {most:g}")
         return value
 
     return read
 
 
 def positive_number(text: str) -> float:
-    """Return a number above 0, and not beyond anything that can be meant."""
+    """Return a number above 0 and at most 1000."""
     try:
         number = float(text)
     except ValueError:
         number = 0.0
     if not 0.0 < number <= 1000.0:
-        raise argparse.ArgumentTypeError(f"is {text}; allowed is a number above 0 and at most 1000")
+        raise argparse.ArgumentTypeError(f"is {text}; allowed: a number above 0 and at most 1000")
     return number
 
 

@@ -1,4 +1,4 @@
-"""A program of this project as a process of its own, where no other package of the same name is run in its place."""
+"""Run a program of this project as a separate process, even if another package has the same name."""
 
 import os
 import sys
@@ -9,11 +9,11 @@ _HOME = Path(__file__).resolve().parents[1]
 
 
 def own_program(module: str, *words: str) -> list[str]:
-    """Return the command that runs a module of this project; the current folder is not on its path (`-P`)."""
+    """Return the command that runs a module of this project. The current folder is not on its path (`-P`)."""
     return [sys.executable, "-P", "-m", module, *words]
 
 
 def own_environment() -> dict[str, str]:
-    """Return the environment for it: this project's packages come before all that PYTHONPATH has."""
+    """Return the environment of the process: this project's packages precede those in PYTHONPATH."""
     path = [str(_HOME), *filter(None, [os.environ.get("PYTHONPATH")])]
     return os.environ | {"PYTHONPATH": os.pathsep.join(path), "PYTHONSAFEPATH": "1"}

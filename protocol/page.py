@@ -1,4 +1,4 @@
-"""One HTML page that needs nothing else: for wide and narrow screens, light and dark, and for print."""
+"""One self-contained HTML page for wide and narrow screens, light and dark mode, and print."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -11,7 +11,7 @@ Kind = Literal["good", "bad"]
 
 
 class Marked(NamedTuple):
-    """A cell of a table that stands out."""
+    """A highlighted cell of a table."""
 
     text: str
     kind: Kind
@@ -21,14 +21,14 @@ Cell = str | Marked
 
 
 class Origin(NamedTuple):
-    """What made a page: the command line, and its date and time where the run had one."""
+    """The origin of a page: the command line, and its date and time if the run had one."""
 
     command: str = ""
     date: str | None = None
 
 
 def page(title: str, blocks: Iterable[str], origin: Origin | None = None, style: str = "") -> str:
-    """Return a page of blocks of HTML; `style` is CSS of this page alone."""
+    """Return a page from blocks of HTML; `style` is additional CSS of this page."""
     css = files("protocol").joinpath("page.css").read_text(encoding="utf-8") + style
     body = "\n".join((f"<h1>{escape(title)}</h1>", *blocks, _footer(origin or Origin())))
     return (
@@ -44,7 +44,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def heading(text: str) -> str:
-    """Return the heading of a part."""
+    """Return the heading of a section."""
     return f"<h2>{escape(text)}</h2>"
 
 
@@ -54,12 +54,12 @@ def paragraph(text: str) -> str:
 
 
 def verdict(text: str, is_good: bool) -> str:
-    """Return the sentence that matters most, with the worst figure in it."""
+    """Return the main result as a sentence with the worst figure."""
     return f'<p class="verdict {"good" if is_good else "bad"}">{escape(text)}</p>'
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Cell]], sums: int = 0, words: bool = False) -> str:
-    """Return a table of figures, or of words; the last `sums` rows stand out as sums."""
+    """Return a table of figures, or of text; the last `sums` rows are highlighted as sums."""
     header = "<tr>" + "".join(f"<th>{escape(cell)}</th>" for cell in head) + "</tr>" if any(head) else ""
     lines = ["".join(map(_cell, row)) for row in rows]
     body = "\n".join(
@@ -70,14 +70,14 @@ def table(head: Sequence[str], rows: Iterable[Sequence[Cell]], sums: int = 0, wo
 
 
 def figure(svg: str, alt: str, caption: str = "") -> str:
-    """Return an `<svg>` element as a figure; `alt` describes it to those who cannot see it."""
+    """Return an `<svg>` element as a figure; `alt` is its text alternative."""
     described = svg.replace("<svg ", f'<svg role="img" aria-label="{escape(alt)}" ', 1)
     below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
     return f'<figure><div class="wide">{described}</div>{below}</figure>'
 
 
 def details(summary: str, block: str) -> str:
-    """Return a block that opens when its summary is clicked."""
+    """Return a block that opens on a click on its summary."""
     return f"<details><summary>{escape(summary)}</summary>{block}</details>"
 
 

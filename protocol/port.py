@@ -1,21 +1,21 @@
-"""What the client needs of a serial port: a part of pyserial's interface."""
+"""The interface of a serial port that the client needs: a part of pyserial's."""
 
 from typing import Protocol
 
 
 class Port(Protocol):
-    """An open pyserial port, or anything that behaves like one."""
+    """An open pyserial port, or an object that behaves like one."""
 
     timeout: float | None
-    """How long `read` waits, in seconds."""
+    """The maximum time that `read` waits, in seconds."""
 
     @property
     def in_waiting(self) -> int:
-        """The number of bytes that can be read at once; some ports say only 0 or 1."""
+        """The number of bytes that can be read without waiting; some ports report only 0 or 1."""
         ...
 
     def read(self, size: int, /) -> bytes:
-        """Return `size` bytes, or fewer when `timeout` has passed."""
+        """Return `size` bytes, or fewer after `timeout`."""
         ...
 
     def write(self, data: bytes, /) -> int | None:
@@ -23,5 +23,5 @@ class Port(Protocol):
         ...
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
         ...

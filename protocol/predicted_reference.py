@@ -1,7 +1,7 @@
-"""Where the table's reference is, predicted from the commands that a client sent; no I/O.
+"""The position of the table's reference, predicted from the commands of a client; no I/O.
 
-The prediction begins where a client has seen the table at rest. It ends when a command leaves the start or the profile
-of a motion open, or when a reading contradicts it: from then on nothing is known until the table rests again.
+The prediction starts when the client observes the table at rest. It ends when the start or the profile of a motion is
+uncertain, or when a reading contradicts it. Then nothing is known until the table rests again.
 """
 
 from typing import NamedTuple
@@ -9,19 +9,19 @@ from typing import NamedTuple
 from protocol.messages import Command, Verb
 from protocol.trapezoid import Motion, MotionCommand, ReferenceState
 
-# A reading this far from the prediction refutes it: more than a sound table lags behind.
+# A reading this far from the prediction contradicts it: the following error of a correct table is smaller.
 _STRAYED_DEG = 1.0
 
 
 class PredictedReference(NamedTuple):
-    """What is known of the reference; None for what is not.
+    """The known state of the reference; None for what is not known.
 
     Attributes:
         speed_deg_s: S for the next motion.
         acceleration_deg_s2: A for the next motion.
-        target_deg: of the motion that was commanded last.
-        motion: the motion that was commanded last.
-        began_s: when it began, on the client's clock.
+        target_deg: target of the last commanded motion.
+        motion: the last commanded motion.
+        began_s: its start time, on the client's clock.
     """
 
     speed_deg_s: float | None = None
@@ -35,7 +35,7 @@ class PredictedReference(NamedTuple):
         return None if self.motion is None else self.motion.at(time_s - self.began_s)
 
     def after(self, command: Command, time_s: float) -> "PredictedReference":
-        """Return the prediction once the table has carried out a command at a time."""
+        """Return the prediction after the table has executed a command at a time."""
         if command.value is None:
             return self
         value = float(command.value)
@@ -52,13 +52,13 @@ class PredictedReference(NamedTuple):
         )
 
     def without_setting(self, verb: Verb) -> "PredictedReference":
-        """Return the prediction when it is open whether a command of this verb was carried out."""
+        """Return the prediction when it is not known whether a command of this verb was executed."""
         if verb is Verb.SET_SPEED:
             return self._replace(speed_deg_s=None)
         return self._replace(acceleration_deg_s2=None) if verb is Verb.SET_ACCELERATION else self
 
     def seen(self, position_deg: float, begin_s: float, end_s: float) -> "PredictedReference":
-        """Return what is left of the prediction after a reading of an instant between two times."""
+        """Return the prediction after a reading that was taken between two times."""
         if self.motion is None:
             return self
         positions = [self.motion.at(time_s - self.began_s)[0] for time_s in (begin_s, 0.5 * (begin_s + end_s), end_s)]
@@ -66,10 +66,10 @@ class PredictedReference(NamedTuple):
         return self._replace(motion=None) if off_deg > _STRAYED_DEG else self
 
     def resting(self, angle_deg: float, time_s: float) -> "PredictedReference":
-        """Return the prediction for a table that was seen to rest."""
+        """Return the prediction for a table that was observed at rest."""
         return self._replace(motion=Motion.at_rest(angle_deg), target_deg=angle_deg, began_s=time_s)
 
     @property
     def rests_s(self) -> float | None:
-        """When the reference is at its target and stands."""
+        """The time at which the reference rests at its target."""
         return None if self.motion is None else self.began_s + self.motion.duration_s

@@ -1,4 +1,4 @@
-"""Progress of long work: one line on a terminal that is wiped when the work is done, and nothing in a pipe."""
+"""Progress of long work: one line on a terminal, erased at the end; no output to a pipe."""
 
 import os
 import sys
@@ -7,27 +7,27 @@ from contextlib import contextmanager, suppress
 from typing import TextIO
 
 Progress = Callable[[int, int], None]
-"""Called with the work done and all work, in any unit."""
+"""Called with the finished work and the total work, in any unit."""
 
 ProgressOf = Callable[[str], Progress | None]
-"""Gives the progress of a kind of work."""
+"""Gives the progress function for a kind of work."""
 
 _WIPE = "\r\x1b[K"
 _STEPS = 1000
 
 
 def is_terminal(stream: TextIO | None) -> bool:
-    """Return whether a person is at a stream; one that was closed before the start is None."""
+    """Return whether a stream is a terminal. A stream that was closed before the start is None."""
     return stream is not None and stream.isatty()
 
 
 def shows_progress(stream: TextIO | None) -> bool:
-    """Return whether a stream can show a line in place of the one before it."""
+    """Return whether a stream can replace the previous line."""
     return is_terminal(stream) and os.environ.get("TERM") != "dumb"
 
 
 def show_line(text: str, stream: TextIO | None) -> None:
-    """Show a line in place of the one before it, where the stream can; an empty one wipes it."""
+    """Replace the previous line, if the stream can. An empty line erases it."""
     if stream is not None and shows_progress(stream):
         with suppress(OSError):
             stream.write(_WIPE + text)
@@ -35,7 +35,7 @@ def show_line(text: str, stream: TextIO | None) -> None:
 
 
 def progress_line(label: str, stream: TextIO | None) -> Progress | None:
-    """Return what to call with the work done and all work, or None where `stream` cannot show it."""
+    """Return the function to call with the finished and the total work, or None if `stream` cannot show progress."""
     if not shows_progress(stream):
         return None
 
@@ -47,7 +47,10 @@ def progress_line(label: str, stream: TextIO | None) -> Progress | None:
 
 @contextmanager
 def share_shown(label: str) -> Iterator[Callable[[float], None]]:
-    """Give what to call with the share (0..1) of the work that is done; it is shown on stderr, and wiped in the end."""
+    """Give the function to call with the finished share (0..1) of the work.
+
+    It shows the share on stderr, and erases it at the end.
+    """
     show = progress_line(label, sys.stderr)
     shown = -1
 

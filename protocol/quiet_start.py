@@ -1,8 +1,8 @@
-"""Imported first by each package that holds programs: Ctrl-C during the imports ends them with one line.
+"""End a program with one line on Ctrl-C during its imports. Each package with programs imports this module first.
 
-The status is 130, and there is no traceback from whatever was being imported. Where an extra is missing, that is one
-line too, and status 2. Only a program of this project, started as `python -m planner ...` or `seventh-axis ...`, is
-ended so; one that imports these packages as a library keeps its own signals and its exceptions.
+The status is 130, without a traceback. A missing extra is reported in one line too, with status 2. This applies only to
+a program of this project, started as `python -m planner ...` or `seventh-axis ...`. A program that imports these
+packages as a library keeps its own signal handlers and exceptions.
 """
 
 import os
@@ -30,14 +30,14 @@ def program_run(command: Sequence[str]) -> str:
 
 
 def end_quietly(number: int, _: FrameType | None) -> None:
-    """End the program at once: during the imports there is nothing to put away."""
+    """End the program at once: during the imports there is nothing to clean up."""
     os.write(2, f"{_PROGRAM}: interrupted\n".encode())
     os._exit(128 + number)
 
 
 def end_without_extra(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
-    """End the program with one line where an import did not find a module of an extra; else print the traceback."""
-    from protocol.extras import missing_extra  # noqa: PLC0415  # seldom needed, and a start should be quick
+    """End the program with one line if an import did not find a module of an extra; else print the traceback."""
+    from protocol.extras import missing_extra  # noqa: PLC0415  # rarely needed, and the start should be fast
 
     if sentence := missing_extra(error, _PROGRAM, *sys.argv[1:2]):
         sys.stderr.write(f"{_PROGRAM}: {sentence}\n")
@@ -47,9 +47,9 @@ def end_without_extra(kind: type[BaseException], error: BaseException, traceback
 
 _PROGRAM = program_run(sys.orig_argv)
 IS_PROGRAM = _PROGRAM.partition(".")[0] in _PROGRAMS
-"""Whether this process is a program of this project, and no other that uses it."""
+"""Whether this process is a program of this project."""
 if IS_PROGRAM:
     sys.excepthook = end_without_extra
-# Ignored signals (nohup, `&` in a script) stay so.
+# Ignored signals (nohup, `&` in a script) stay ignored.
 if IS_PROGRAM and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, end_quietly)

@@ -1,4 +1,4 @@
-"""Open any port of pyserial's with one time-out for reading and writing, where the port has both."""
+"""Open any pyserial port with one timeout for reading and writing, if the port has both."""
 
 import warnings
 from typing import Any
@@ -10,20 +10,20 @@ _RFC2217 = "rfc2217://"
 
 
 class _Rfc2217Port(serial.rfc2217.Serial):
-    """pyserial's port over RFC 2217, whose read time-out is not negotiated.
+    """pyserial's port over RFC 2217, with a read timeout that is not negotiated.
 
-    pyserial sends all settings anew, and waits 50 ms or more, whenever the time-out is set.
+    pyserial sends all settings again, and waits 50 ms or more, whenever the timeout is set.
     """
 
     def open(self) -> None:
-        """Connect, and negotiate the settings."""
+        """Connect and negotiate the settings."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # pyserial calls setDaemon and setName
             super().open()
 
     @property
     def timeout(self) -> float | None:
-        """How long `read` waits, in seconds."""
+        """The maximum time that `read` waits, in seconds."""
         return self._timeout
 
     @timeout.setter
@@ -31,19 +31,19 @@ class _Rfc2217Port(serial.rfc2217.Serial):
         self._timeout = timeout_s
 
 
-def open_serial_port(url: str, baud: int, timeout_s: float, **more: Any) -> Any:  # noqa: ANN401  # some port of pyserial's
-    """Return the port of a device or URL.
+def open_serial_port(url: str, baud: int, timeout_s: float, **more: Any) -> Any:  # noqa: ANN401  # any pyserial port
+    """Return the port for a device or URL.
 
     Args:
-        url: the device, or any URL of pyserial's.
+        url: a device or any pyserial URL.
         baud: rate in baud.
-        timeout_s: for reading, and for writing too.
-        more: other settings of pyserial's.
+        timeout_s: timeout for reading and writing.
+        more: other pyserial settings.
 
     Raises:
-        OSError, ValueError: it cannot be opened so.
+        OSError, ValueError: the port cannot be opened with these settings.
     """
     settings = {"baudrate": baud, "timeout": timeout_s, **more}
-    if url.lower().startswith(_RFC2217):  # it buffers what is written, and has no time-out for that
+    if url.lower().startswith(_RFC2217):  # the port buffers written bytes, and has no write timeout
         return _Rfc2217Port(url, **settings)
     return serial.serial_for_url(url, write_timeout=timeout_s, **settings)

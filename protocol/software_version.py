@@ -1,4 +1,4 @@
-"""Which version of the software wrote a file."""
+"""The version of the software, for the files that it writes."""
 
 from importlib.metadata import PackageNotFoundError, version
 

@@ -1,15 +1,15 @@
-"""Stop a table that moves: brake at once, as hard as it may be braked, and wait until it stands.
+"""Stop a moving table: brake at once, with the maximum acceleration, and wait until it stands.
 
-    A 100.0     the greatest A that the table has accepted
+    A 100.0     the maximum A that the table has accepted
     R 3.1       to the nearest point at which it can stand: v |v| / (2 A) from where its reference is
-    S 40.0      the greatest S, so that a rest of the way does not take long
+    S 40.0      the maximum S, so that the rest of the motion is short
     R 2.6       the same point
 
-An increment counts from where the reference is when the table carries it out (clause 4.5/1), so nobody has to know
-where that is, nor when: the speed alone must be known. It is predicted from the commands that this client sent.
+An increment counts from the position of the reference when the table executes it (clause 4.5/1). So the client needs
+neither this position nor the time, only the speed. The speed is predicted from the commands that this client sent.
 
-Where the speed is unknown (somebody else's motion, a table that has strayed), `R 0` begins the braking: the table would
-come back to where it was. As soon as its readings show that it turns, a second `R 0` holds it there.
+If the speed is unknown (a motion of another client, a table that deviates), `R 0` starts the braking: the table would
+return to the point of the command. As soon as its readings show that it reverses, a second `R 0` holds it there.
 """
 
 from contextlib import suppress
@@ -26,31 +26,32 @@ from protocol.trapezoid import braking_way_deg
 BRAKING_DEG_S2 = 100.0
 """The default table's limit of A."""
 
-# A table that may refuse it is asked for it first, then for less. Ascending, since a refused line changes nothing.
+# A table that may refuse this A receives it first, then lower values. They ascend, because a refused line changes
+# nothing.
 _SHARES = ((1.0,), (0.25, 0.5, 1.0))
-# A table of which nothing is known takes this long at most to brake.
+# Maximum braking time of a table of which nothing is known.
 _LONGEST_S = 60.0
-# Beyond the reference's rest: until the readings show it.
+# Time after the reference's rest until the readings show it.
 _SETTLING_S = 2.0
 _POLL_S = 0.01
-# A table that answers late is asked so often, however long that takes.
+# The number of attempts with a table that replies late, however long they take.
 _READINGS = 4
 _ATTEMPTS = 3
-# Where nothing is known: the default table's greatest S, and its A at power-on.
+# Used when nothing is known: the default table's maximum S, and its A at power-on.
 _SPEED_DEG_S, _ACCELERATION_DEG_S2 = 40.0, 20.0
 
 
 def stop(dialogue: Dialogue, braking_deg_s2: float = BRAKING_DEG_S2) -> float:
-    """Brake, wait until the table stands, and return where; signals wait as long.
+    """Brake, wait until the table stands, and return its position. Signals are deferred until then.
 
-    S and A are those of before afterwards, where they are known.
+    Afterwards S and A have their former values, if those are known.
 
     Args:
-        dialogue: with the table.
-        braking_deg_s2: the greatest A to ask for when the table has not accepted any yet.
+        dialogue: the dialogue with the table.
+        braking_deg_s2: the maximum A to try when the table has not accepted any yet.
 
     Raises:
-        NotStopped: the table was not seen to stand; the message says why, and what it will do.
+        NotStopped: standstill was not observed. The message states why, and what the table will do.
     """
     before = dialogue.reference
     with signals_wait():
@@ -66,13 +67,16 @@ def stop(dialogue: Dialogue, braking_deg_s2: float = BRAKING_DEG_S2) -> float:
 
 
 def standing_increment_deg(reference: PredictedReference, rate_deg_s2: float | None, time_s: float) -> float:
-    """Return the way from where a table is at a time to the nearest point at which it can stand; 0 when unknown."""
+    """Return the distance from the position at a time to the nearest point for a stop; 0 if unknown."""
     state = reference.at(time_s)
     return 0.0 if state is None or not rate_deg_s2 else braking_way_deg(state[1], rate_deg_s2)
 
 
 def _stopped(dialogue: Dialogue, braking_deg_s2: float) -> float:
-    """Return where the table stands; begin anew when replies are missing, or when it does not brake as it should."""
+    """Return the rest position of the table.
+
+    Start again when replies are missing, or when it does not brake as predicted.
+    """
     for attempt in range(1, _ATTEMPTS + 1):
         try:
             _brake(dialogue, braking_deg_s2)
@@ -82,20 +86,20 @@ def _stopped(dialogue: Dialogue, braking_deg_s2: float) -> float:
         except (ReplyTimeout, UnexpectedReply):
             if attempt == _ATTEMPTS:
                 raise
-        for verb in (Verb.SET_SPEED, Verb.SET_ACCELERATION):  # a line was lost, or garbled: it is sent again
+        for verb in (Verb.SET_SPEED, Verb.SET_ACCELERATION):  # a line was lost or garbled: send it again
             dialogue.reference = dialogue.reference.without_setting(verb)
     position_deg, _ = _position(dialogue)
-    raise ArrivalTimeout(f"the table is at {position_deg:g} deg and goes on turning", position_deg)
+    raise ArrivalTimeout(f"the table is at {position_deg:g} deg and is still turning", position_deg)
 
 
 def _brake(dialogue: Dialogue, braking_deg_s2: float) -> None:
-    """Begin to brake at once, then again with the greatest S: what it costs to say that must not delay the braking."""
+    """Start to brake at once, then again with the maximum S: sending S must not delay the braking."""
     rate = dialogue.greatest.get(Verb.SET_ACCELERATION)
     if rate is None:
         for shares in _SHARES:
             asked = [_command(Verb.SET_ACCELERATION, share * braking_deg_s2) for share in shares]
             _move_to_standstill(dialogue, asked)
-        dialogue.reference = dialogue.reference._replace(acceleration_deg_s2=None)  # which of them it took is unknown
+        dialogue.reference = dialogue.reference._replace(acceleration_deg_s2=None)  # which one it executed is unknown
     else:
         is_set = rate == dialogue.reference.acceleration_deg_s2
         _move_to_standstill(dialogue, [] if is_set else [_command(Verb.SET_ACCELERATION, rate)])
@@ -105,17 +109,17 @@ def _brake(dialogue: Dialogue, braking_deg_s2: float) -> None:
 
 
 def _move_to_standstill(dialogue: Dialogue, settings: list[Command]) -> None:
-    """Send settings, and an increment that leads to where the table can stand when it has arrived."""
+    """Send settings, and an increment to the point at which the table can stand when it has arrived."""
     arrival_s = dialogue.arrival_s([*settings, _command(Verb.MOVE_BY, 1.0)])
     rate = dialogue.greatest.get(Verb.SET_ACCELERATION)
     increment_deg = Decimal(repr(standing_increment_deg(dialogue.reference, rate, arrival_s)))
-    # Rounded towards the table: it rather comes back by a digit than goes on for one.
+    # Rounded toward the table: it returns by a digit rather than moving on by one.
     rounded_deg = increment_deg.quantize(Decimal(1).scaleb(-dialogue.decimals), ROUND_DOWN)
     dialogue.send_at_once([*settings, Command(Verb.MOVE_BY, rounded_deg)])
 
 
 def _is_braked(dialogue: Dialogue) -> bool:
-    """Return True when the table stands or turns back, False when it does not do what was predicted."""
+    """Return True when the table stands or reverses, False when it deviates from the prediction."""
     rest_s = dialogue.reference.rests_s
     rate = dialogue.reference.acceleration_deg_s2
     top = dialogue.greatest.get(Verb.SET_SPEED, _SPEED_DEG_S)
@@ -139,10 +143,10 @@ def _is_braked(dialogue: Dialogue) -> bool:
 
 
 def _resting_deg(dialogue: Dialogue) -> float:
-    """Return the position once it stays the same.
+    """Return the position when it no longer changes.
 
     Raises:
-        ArrivalTimeout: it goes on changing.
+        ArrivalTimeout: the position still changes.
     """
     deadline_s = dialogue.clock.now_s() + _LONGEST_S
     position_deg, step_deg = _position(dialogue)
@@ -151,7 +155,7 @@ def _resting_deg(dialogue: Dialogue) -> float:
         position_deg, _ = _position(dialogue)
         standstill.take(dialogue.clock.now_s(), position_deg)
         if dialogue.clock.now_s() > deadline_s:
-            raise ArrivalTimeout(f"the table is at {position_deg:g} deg and goes on turning", position_deg)
+            raise ArrivalTimeout(f"the table is at {position_deg:g} deg and is still turning", position_deg)
         dialogue.clock.sleep_s(_POLL_S)
     dialogue.rests_at(position_deg)
     return position_deg
@@ -167,7 +171,7 @@ def _position(dialogue: Dialogue) -> tuple[float, float]:
 
 
 def _restore(dialogue: Dialogue, before: PredictedReference) -> None:
-    """Set S and A to what they were, where that is known: nobody asked for others."""
+    """Set S and A to their former values, if those are known: nobody requested others."""
     now = dialogue.reference
     if before.acceleration_deg_s2 not in {None, now.acceleration_deg_s2}:
         dialogue.exchange(_command(Verb.SET_ACCELERATION, before.acceleration_deg_s2))
@@ -176,12 +180,12 @@ def _restore(dialogue: Dialogue, before: PredictedReference) -> None:
 
 
 def _what_it_will_do(before: PredictedReference, now_s: float) -> str:
-    """Return in words what becomes of a table that did not receive the stop."""
-    otherwise = "if the table did not receive the stop, it runs on to"
+    """Return as text what a table does that did not receive the stop."""
+    otherwise = "if the table did not receive the stop, it continues to"
     if before.target_deg is None:
-        return f"{otherwise} the target that it was given last, and stands there"
+        return f"{otherwise} its last target, and stops there"
     when = "" if before.rests_s is None else f" within {max(0.0, before.rests_s - now_s):.1f} s"
-    return f"{otherwise} its last target, {before.target_deg:g} deg, and stands there{when}"
+    return f"{otherwise} its last target, {before.target_deg:g} deg, and stops there{when}"
 
 
 def _command(verb: Verb, value: float) -> Command:

@@ -12,7 +12,7 @@ from protocol.toml_table import TomlTable
 _Section = TypeVar("_Section")
 
 
-def quantity(**limits: float) -> Any:  # noqa: ANN401  # stands for a value of the annotated type
+def quantity(**limits: float) -> Any:  # noqa: ANN401  # returned in place of a value of the annotated type
     """Declare a number with its limits: those of `TomlTable.number`, and of `TomlTable.count` for a whole number."""
     return field(metadata=limits)
 

@@ -1,4 +1,4 @@
-"""Read a TOML file key by key, and refuse what nobody asked for.
+"""Read a TOML file key by key, and refuse unknown keys.
 
 Every refusal names the file, the key, its value and what is allowed: a typing error in a configuration must
 never be a silent default. `toml_section` reads a whole table into a dataclass.
@@ -14,7 +14,7 @@ from protocol.data_file import DataFileError, did_you_mean, read_toml, shortened
 
 
 class TomlTable:
-    """One table of a TOML file, which remembers the keys that were read.
+    """One table of a TOML file, which records the keys that were read.
 
     Args:
         file: The file, or another source of the values.
@@ -44,11 +44,11 @@ class TomlTable:
         return key in self.values
 
     def name_of(self, key: str) -> str:
-        """Return the name of `key` with the tables that it is in, such as `cell.probe.stand_off_mm`."""
+        """Return the full name of `key` with its tables, such as `cell.probe.stand_off_mm`."""
         return f"{self._prefix}{key}"
 
     def refuse(self, key: str, allowed: str) -> Exception:
-        """Return the error that states the value of `key` and what is allowed."""
+        """Return the error with the value of `key` and the allowed values."""
         if key not in self.values:
             misspelt = self._misspelt(key)
             first = "" if misspelt is None else f"{self._prefix}{misspelt} is not a known key; did you mean {key}? "
@@ -56,7 +56,7 @@ class TomlTable:
         return self._error(f"{self.file}: {self.name_of(key)} is {shown(self.values[key])}; it must be {allowed}")
 
     def _misspelt(self, key: str) -> str | None:
-        """Return a key that nothing has read and that looks like an absent one."""
+        """Return an unread key that is similar to a missing one."""
         unread = [other for other in self.values if other not in self._read]
         return next((other for other in unread if did_you_mean(shortened(other), [key])), None)
 
@@ -108,7 +108,7 @@ class TomlTable:
         return value
 
     def numbers(self, key: str, count: int, default: Sequence[float] | None = None) -> tuple[float, ...]:
-        """Return the list `key` of `count` finite numbers; required without a default."""
+        """Return the list `key` of `count` finite numbers; required if there is no default."""
         value = self._take(key, default)
         is_list = isinstance(value, list | tuple) and len(value) == count
         if not is_list or not all(map(_is_number, value)):
@@ -116,28 +116,28 @@ class TomlTable:
         return tuple(map(float, value))
 
     def text(self, key: str, default: str | None = None) -> str:
-        """Return the text `key`; required without a default."""
+        """Return the text `key`; required if there is no default."""
         value = self._take(key, default)
         if not isinstance(value, str) or not value:
             raise self.refuse(key, "a text")
         return value
 
     def texts(self, key: str, default: Sequence[str] | None = ()) -> tuple[str, ...]:
-        """Return the list `key` of texts; an absent one is empty."""
+        """Return the list `key` of texts; a missing one is empty."""
         value = self._take(key, default)
         if not isinstance(value, list | tuple) or not all(isinstance(item, str) and item for item in value):
             raise self.refuse(key, "a list of texts")
         return tuple(value)
 
     def choice(self, key: str, choices: Sequence[str], default: str | None = None) -> str:
-        """Return the text `key`, which is one of `choices`; required without a default."""
+        """Return the text `key`, which is one of `choices`; required if there is no default."""
         value = self._take(key, default)
         if value not in choices:
             raise self.refuse(key, "one of " + ", ".join(choices))
         return str(value)
 
     def table(self, key: str) -> "TomlTable":
-        """Return the table `key`; an absent one is empty, unless it is there under a name that is nearly the same."""
+        """Return the table `key`; a missing one is empty, unless a similar name exists."""
         if key not in self.values and (misspelt := self._misspelt(key)) is not None:
             raise self._unknown(misspelt, key)
         value = self._take(key, {})
@@ -153,7 +153,7 @@ class TomlTable:
         return [self._inner(item, f"{key}[{i + 1}].") for i, item in enumerate(value)]
 
     def one_or_more(self, key: str) -> "list[TomlTable]":
-        """Return the table `key`, or the tables of the list `key`; an absent one is an empty table."""
+        """Return the table `key`, or the tables of the list `key`; a missing one is an empty table."""
         value = self.values.get(key)
         return self.tables(key) if isinstance(value, list) and value and _all_tables(value) else [self.table(key)]
 
@@ -161,7 +161,7 @@ class TomlTable:
         return TomlTable(self.file, values, self._prefix + name, self._error)
 
     def only(self, *known: str) -> None:
-        """Refuse keys other than those, before a key that is missing for their sake.
+        """Refuse keys other than these, before a key is missing because of them.
 
         Raises:
             Exception: (the error of this table) The first such key, with those that are known here.
@@ -171,7 +171,7 @@ class TomlTable:
                 raise self._unknown(key, *known)
 
     def finish(self) -> None:
-        """Refuse keys that nothing has read.
+        """Refuse keys that were not read.
 
         Raises:
             Exception: (the error of this table) One such key, with those that are known here.
@@ -194,7 +194,7 @@ def _is_number(value: object) -> bool:
         return False
     try:
         return math.isfinite(value)
-    except OverflowError:  # a whole number beyond all floats
+    except OverflowError:  # an integer beyond the range of floats
         return False
 
 

@@ -1,7 +1,7 @@
 """The trapezoidal velocity profile that P, S and A prescribe, in closed form (section 2.1; clauses 7.1 and 7.3).
 
-A table's controller plans nothing ahead. At any moment its reference takes the maximum speed that A, S and the distance
-left to brake allow, from the position and the speed that it has. So the reference is known from a command until it
+A table's controller plans nothing ahead. At any time its reference moves at the maximum speed that A, S and the
+remaining braking distance allow, from its present position and speed. So the reference is known from a command until it
 stands: a few segments of constant acceleration. This is not the code of a table.
 """
 
@@ -9,19 +9,19 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-# Distances in degrees below this are rounding: the firmware's own unit is a hundred times coarser.
+# Smaller distances in degrees are rounding: the firmware's own unit is a hundred times coarser.
 _ROUNDING_DEG = 1e-9
 
 
 class ReferenceState(NamedTuple):
-    """Where the reference is, and how fast it moves."""
+    """The position and speed of the reference."""
 
     angle_deg: float
     speed_deg_s: float
 
 
 class MotionCommand(NamedTuple):
-    """One motion of the table: `P` with the `S` and the `A` that it latches, the last two above 0."""
+    """One motion of the table: `P` with its latched `S` and `A`, the last two above 0."""
 
     target_deg: float
     speed_deg_s: float
@@ -29,14 +29,14 @@ class MotionCommand(NamedTuple):
 
 
 class Segment(NamedTuple):
-    """Constant acceleration for a while."""
+    """A segment of constant acceleration."""
 
     duration_s: float
     acceleration_deg_s2: float
 
 
 class Motion(NamedTuple):
-    """A motion from a position and a speed to a target, segment by segment."""
+    """A motion from a position and a speed to a target, as a sequence of phases."""
 
     start: ReferenceState
     target_deg: float
@@ -54,11 +54,11 @@ class Motion(NamedTuple):
 
     @property
     def duration_s(self) -> float:
-        """The time from the command until the reference stands at the target."""
+        """The time from the command until the reference rests at the target."""
         return sum(segment.duration_s for segment in self.segments)
 
     def at(self, time_s: float) -> ReferenceState:
-        """Return the reference's position and speed at a time since the command."""
+        """Return the position and speed of the reference at a time since the command."""
         return _along(self.segments, self.start, max(time_s, 0.0)) or ReferenceState(self.target_deg, 0.0)
 
 
@@ -72,10 +72,10 @@ def move(state: ReferenceState, acceleration_deg_s2: float, duration_s: float) -
 
 
 def segments(state: ReferenceState, command: MotionCommand) -> Iterator[Segment]:
-    """Yield what the reference does from the moment of a command until it stands at the target.
+    """Yield the segments of the reference from a command until it stands at the target.
 
-    A target behind, or nearer than the way needed to brake: it brakes at A to zero, passes, and comes back. A lower
-    speed than the present one: it brakes at A to S.
+    If the target is behind, or nearer than the braking distance, it brakes at A to zero, passes, and returns. If the
+    new speed is lower than the present one, it brakes at A to S.
     """
     target, top_speed, rate = command
     distance, speed = target - state.angle_deg, state.speed_deg_s
@@ -100,19 +100,19 @@ def segments(state: ReferenceState, command: MotionCommand) -> Iterator[Segment]
 
 
 def advance(state: ReferenceState, command: MotionCommand, duration_s: float) -> ReferenceState:
-    """Return where the reference is `duration_s` after a command; once it stands, exactly at the target."""
+    """Return the reference `duration_s` after a command; once it stands, exactly at the target."""
     if math.isinf(command.target_deg):
         return _go_on(state, command, duration_s)
     return _along(segments(state, command), state, duration_s) or ReferenceState(command.target_deg, 0.0)
 
 
 def time_to_rest_s(state: ReferenceState, command: MotionCommand) -> float:
-    """Return how long the reference takes to stand at the target."""
+    """Return the time until the reference stands at the target."""
     return sum(segment.duration_s for segment in segments(state, command))
 
 
 def way_to_rest_deg(state: ReferenceState, command: MotionCommand) -> tuple[float, float]:
-    """Return the lowest and the highest angle of the reference until it stands at the target."""
+    """Return the minimum and maximum angle of the reference until it stands at the target."""
     ends = [state.angle_deg, command.target_deg]
     for segment in segments(state, command):
         state = move(state, segment.acceleration_deg_s2, segment.duration_s)
@@ -121,7 +121,7 @@ def way_to_rest_deg(state: ReferenceState, command: MotionCommand) -> tuple[floa
 
 
 def braking_way_deg(speed_deg_s: float, rate_deg_s2: float) -> float:
-    """Return the signed way from a speed to standstill: there is the nearest point at which the table can stand."""
+    """Return the signed distance from a speed to standstill: the nearest point at which the table can stand."""
     return 0.5 * speed_deg_s * abs(speed_deg_s) / rate_deg_s2
 
 
@@ -136,7 +136,7 @@ def _along(parts: Iterable[Segment], state: ReferenceState, time_s: float) -> Re
 
 
 def _go_on(state: ReferenceState, command: MotionCommand, duration_s: float) -> ReferenceState:
-    """Return where the reference is on its way to a target that is infinitely far: one ramp, and then its S."""
+    """Return the reference during a motion to a target at infinity: one ramp, and then its S."""
     target, top_speed, rate = command
     angle, speed = state
     top = math.copysign(top_speed, target)

@@ -1,4 +1,4 @@
-"""A file that others may wait for: it appears when it is whole, or not at all."""
+"""A file that other programs may wait for: it appears when it is complete, or not at all."""
 
 import os
 import secrets
@@ -9,7 +9,9 @@ from pathlib import Path
 
 @contextmanager
 def whole_file(file: Path) -> Iterator[Path]:
-    """Give the path of a partial file to write; it is renamed to `file` in the end, or removed on any exception.
+    """Give the path of a partial file for writing.
+
+    At the end it is renamed to `file`, or removed on any exception.
 
     The partial file is created here, exclusively: no other program writes it, and no symbolic link is followed.
     """
@@ -23,6 +25,6 @@ def whole_file(file: Path) -> Iterator[Path]:
 
 
 def write_whole(file: Path, text: str) -> None:
-    """Write a text file that appears when it is whole."""
+    """Write a text file that appears when it is complete."""
     with whole_file(file) as partial:
         partial.write_text(text, encoding="utf-8")

@@ -24,7 +24,7 @@ _HANDLERS: dict[signal.Signals, Callable[[int, FrameType | None], object] | sign
 
 @pytest.fixture(scope="session", autouse=True)
 def _signals_are_received() -> Iterator[None]:
-    """Let tests send signals, to themselves and to programs that they start, where `&` or nohup has them ignored."""
+    """Let tests send signals to themselves and to programs that they start, even if `&` or nohup has ignored them."""
     ignored = [number for number in _HANDLERS if signal.getsignal(number) is signal.SIG_IGN]
     for number in ignored:
         signal.signal(number, _HANDLERS[number])

@@ -1,4 +1,4 @@
-"""The shape of the whole: imports run one way, and clocks, ports and threads stay at the edge."""
+"""The structure of the project: imports have one direction, and clocks, ports and threads stay at the edge."""
 
 import ast
 import re
@@ -26,6 +26,8 @@ ROOMS = {
         "table",
         "cell",
         "map",
+        "plans",
+        "search",
         "planning",
         "execution",
         "tracking",
@@ -80,7 +82,7 @@ PROTOCOL_EDGE = {
     "protocol/interrupts.py": {"signal", "threading"},
     "protocol/ending.py": {"os"},
     "protocol/kept_code.py": {"pathlib"},
-    "protocol/kept_file.py": {"os", "pathlib", "time"},
+    "protocol/kept_file.py": {"fcntl", "os", "pathlib", "time"},
     "protocol/progress.py": {"os"},
     "protocol/quiet_start.py": {"os", "signal"},
     "protocol/conformance/__main__.py": {"pathlib"},
@@ -141,7 +143,7 @@ def imported_packages(source: Path) -> Iterator[str]:
 
 
 def imports_from(packages: Iterable[str], sources: Iterable[Path]) -> list[tuple[str, str]]:
-    """Return which source imports what from any of some packages, which are given by their full names."""
+    """Return which source imports what from any of some packages, given by their full names."""
     beginnings = tuple(f"{package}." for package in packages)
     return [
         (str(source), name)
@@ -192,7 +194,7 @@ def test_the_files_beside_the_rooms_need_none_of_them(package: str) -> None:
 
 
 CORE = ("plant", "firmware", "line")
-"""The rooms of the emulator that another simulator may take over: they take constants as values and know no file."""
+"""The rooms of the emulator that another simulator may use: they take constants as values and read no file."""
 
 
 @pytest.mark.parametrize("room", CORE)
@@ -247,8 +249,8 @@ def test_the_emulator_touches_clock_ports_and_files_at_its_edge_only() -> None:
     )  # they only teach pyserial a port
 
 
-TABLE_NAMES = ("table", "bench", "stand", "view", "simulated", "status", "snapshot", "stand_in")
-"""What a table, its bench, or a look at it is called, alone or as the end of a name."""
+TABLE_NAMES = ("table", "bench", "stand", "view", "simulated", "status", "snapshot", "start_emulator")
+"""Names of a table, its bench, or its state, alone or as the end of a name."""
 
 
 def names_a_table(name: str) -> bool:
@@ -298,7 +300,7 @@ def test_an_untyped_table_is_seen(source: str) -> None:
     assert len(list(untyped_tables(ast.parse(source)))) == 1
 
 
-def test_the_stand_in_starts_with_neither_numpy_nor_numba() -> None:
+def test_the_emulator_starts_with_neither_numpy_nor_numba() -> None:
     program = "import sys, emulator.__main__; print(*({'numpy', 'numba', 'scipy'} & sys.modules.keys()))"
     result = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
     assert result.stdout.strip() == ""

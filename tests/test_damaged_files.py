@@ -1,4 +1,4 @@
-"""Every file that a command reads, damaged in every way: one line that names the file, and status 2."""
+"""Every file that a command reads, damaged in many ways: one line that names the file, and status 2."""
 
 from collections.abc import Callable
 from pathlib import Path

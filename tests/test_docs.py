@@ -1,7 +1,7 @@
-"""Every example in the README and the docs is run, and gives what the page says.
+"""Every example in the README and the docs is run, and gives the output on the page.
 
-A `console` block holds commands after `$ ` and what they print; one that ends in `&` keeps running until the page ends.
-A `python` block is an interactive session. `...` stands for anything. The blocks of a page follow one another.
+A `console` block contains commands after `$ ` and their output; a command that ends in `&` runs until the page ends. A
+`python` block is an interactive session. `...` matches anything. The blocks of a page follow one another.
 """
 
 import doctest

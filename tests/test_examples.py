@@ -1,4 +1,4 @@
-"""Every example in docs/examples runs, and prints what it is there to show."""
+"""Every example in docs/examples runs, and prints its expected output."""
 
 import ast
 import json
@@ -25,8 +25,9 @@ EXPECTED = {
     "08_own_arm": r"shipped arms: kuka_kr6_r700, viper_s650.*\nAdept Viper s650 +\d.*\nmine +[1-9]",
     "09_gains_by_python_control": r"gain margin \d.* dB, phase margin \d+ deg, Ms 1\.\d",
     "10_scan_in_a_notebook": r"verified: within 0\.\d+ deg",
+    "11_stream_poses": r"verified: within 0\.\d+ deg .*(.*\n)*tracked +30 of 30 locations",
 }
-"""What the output of each holds, by the name of the file without its ending."""
+"""The expected content of the output of each, by the name of the file without its suffix."""
 
 
 @pytest.fixture(autouse=True)

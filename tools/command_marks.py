@@ -1,4 +1,4 @@
-"""The commands of a trace, and their marks in a drawing: as many labels as can be read."""
+"""The commands of a trace, and their marks in a drawing, with as many labels as are legible."""
 
 from typing import NamedTuple
 
@@ -10,9 +10,9 @@ from protocol import LineBuffer
 _MOTION_VERBS = "PRSA"
 _LABEL_POINTS = 8.0
 _LABEL_SHARE = 0.085
-"""Width of a label, as a share of the time that is drawn: later commands within it stand under the first one."""
+"""Width of a label, as a share of the drawn time: later commands within it are listed below the first one."""
 _MOST_TICKS = 400
-"""More ticks than that run into one bar."""
+"""More ticks than this merge into one bar."""
 _MOST_LINES = 4
 _LONGEST_LINE = 10
 
@@ -25,7 +25,7 @@ class CommandGroup(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The commands, one a line; of many commands the first ones and how many more there are."""
+        """The commands, one per line; of many commands, the first ones and the number of the others."""
         shown = self.texts if len(self.texts) <= _MOST_LINES else self.texts[: _MOST_LINES - 1]
         lines = [text if len(text) <= _LONGEST_LINE else f"{text[: _LONGEST_LINE - 1]}…" for text in shown]
         hidden = len(self.texts) - len(shown)
@@ -44,7 +44,7 @@ def commands_of(trace: Trace) -> list[tuple[float, str]]:
 
 
 def grouped(commands: list[tuple[float, str]], duration_s: float) -> list[CommandGroup]:
-    """Return the commands in groups whose labels stand side by side in a drawing of a duration."""
+    """Return the commands in groups whose labels fit side by side in a drawing of a duration."""
     groups: list[CommandGroup] = []
     for time_s, text in commands:
         if groups and time_s - groups[-1].time_s < _LABEL_SHARE * duration_s:

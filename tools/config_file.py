@@ -8,12 +8,12 @@ from emulator.config.table_config import TableConfig, load_config
 
 
 def config_toml(config: TableConfig, comment: str, always: frozenset[str] = frozenset()) -> str:
-    """Return the constants that differ from the default ones, as `load_config` reads them; all digits.
+    """Return the constants that differ from the default ones, in the format of `load_config`, with all digits.
 
     Args:
-        config: The table; its faults are left out.
-        comment: Stands above; may have several lines.
-        always: Keys such as `gains.ramp.integral_time_s` that are written even if they are the default ones.
+        config: the table; its faults are omitted.
+        comment: written at the top; may have several lines.
+        always: keys such as `gains.ramp.integral_time_s` that are written even if they have the default values.
     """
     lines = [f"# {line}" for line in comment.splitlines()]
     default = dict(_numbers(load_config()))

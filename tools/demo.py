@@ -1,11 +1,11 @@
 """The main job, on real input: `python -m tools.demo --out DIR`.
 
-Plans the shipped scan of a cylinder, starts an emulator on a pty as a program of its own, streams the plan to it,
-proves from what came back that the motion was the planned one, and names the page that shows it all.
-`python -m tools.demo preemption --out DIR` draws Fig. 4 of the paper instead.
+Plans the shipped scan of a cylinder, starts an emulator on a pty as a separate program, and streams the plan to it.
+Then it verifies from the readings that the motion was as planned, and prints the name of the report. `python -m
+tools.demo preemption --out DIR` draws Fig. 4 of the paper instead.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the imports that take long
+import protocol.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -18,13 +18,12 @@ from planner.__main__ import main as planner
 from protocol import TableError
 from protocol.command_line import Parser, program_name
 from protocol.ending import ended
-from tools.preemption import draw_preemption, stand_in
 
 SCAN = "cylinder"
 TIME_SCALE = 1.5
-"""The emulator runs this much faster than real, so that nobody waits for a scan of 47 s."""
+"""Time scale of the emulator, so that a scan of 47 s is short."""
 LEAD_S = 0.0035
-"""How far the emulator's encoder runs behind its reference."""
+"""Lag of the emulator's encoder behind its reference."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -35,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         epilog="example: python -m tools.demo --out build/demo",
     )
     parser.add_argument("job", choices=("scan", "preemption"), nargs="?", default="scan", help="default: scan")
-    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="where the results go")
+    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="output folder")
     options = parser.parse_args(arguments)
     return ended("demo", lambda: _run(options), TableError)
 
@@ -43,6 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     if options.job == "preemption":
+        from tools.preemption import draw_preemption  # noqa: PLC0415  # it loads matplotlib
+
         print(draw_preemption(options.out))
         return 0
     return scan_on_a_pty(options.out)
@@ -50,14 +51,16 @@ def _run(options: argparse.Namespace) -> int:
 
 def scan_on_a_pty(out: Path) -> int:
     """Plan, run, verify and show the scan; return the first exit status that is not 0."""
+    from tools.preemption import start_emulator  # noqa: PLC0415  # it loads matplotlib
+
     command = ["plan", SCAN, "--out", str(out)]
     _say(f"python -m planner {' '.join(command)}")
     if status := planner(command):
         return status
-    # The path of a socket must be short, that of `out` may not be.
+    # The path of a socket must be short, but `out` need not be.
     with tempfile.TemporaryDirectory() as folder:
         control = str(Path(folder) / "control")
-        with stand_in("--pty", "--control", control, "--time-scale", f"{TIME_SCALE:g}") as port:
+        with start_emulator("--pty", "--control", control, "--time-scale", f"{TIME_SCALE:g}") as port:
             command = ["run", str(out / "plan.json"), "--port", port, "--control", control, "--arm-away"]
             command += ["--time-scale", f"{TIME_SCALE:g}", "--lead", f"{LEAD_S:g}", "--out", str(out / "run")]
             _say(f"python -m planner {' '.join(command)}")

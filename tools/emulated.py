@@ -1,4 +1,4 @@
-"""Runs of the compiled emulator in the units of people: seconds, degrees, duty as a share."""
+"""Runs of the compiled emulator in everyday units: seconds, degrees, duty as a share."""
 
 from dataclasses import replace
 from random import Random
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class Motion(NamedTuple):
-    """A motion command, carried out at a time; `by` tells an increment (R) from a position (P)."""
+    """A motion command, executed at a time; `by` distinguishes an increment (R) from a position (P)."""
 
     time_s: float
     angle_deg: float
@@ -28,14 +28,14 @@ class Motion(NamedTuple):
 
 
 class Load(NamedTuple):
-    """A load torque at the table from a time on."""
+    """A load torque at the table from a given time on."""
 
     time_s: float
     torque_Nm: float
 
 
 class Answer(NamedTuple):
-    """What the table did, an entry for each tick. True angles and speeds lie behind the backlash."""
+    """The motion of the table, an entry for each tick. True angles and speeds are behind the backlash."""
 
     time_s: Array
     reference_deg: Array
@@ -55,15 +55,18 @@ def with_gains(config: TableConfig, ramp: GainsConfig, hold: GainsConfig) -> Tab
 
 
 def switched_on(config: TableConfig, seed: int) -> tuple[TableConstants, TableState]:
-    """Return a table at rest; the seed says where the shaft stands between two counts, and the teeth in the gap."""
-    chance = Random(seed)  # noqa: S311  # where a gear stands is no secret
+    """Return a table at rest.
+
+    The seed determines the position of the shaft between two counts, and of the teeth in the gap.
+    """
+    chance = Random(seed)  # noqa: S311  # not for security
     constants = table_constants(config, encoder_phase=chance.random())
     drive = at_standstill(constants.drive, gap_share=chance.uniform(-1.0, 1.0))
     return constants, woken(constants, drive, Profile.of(1, 1))
 
 
 def motion_rows(config: TableConfig, motions: list[Motion]) -> NDArray[np.int64]:
-    """Return motions as `emulator.table.batch` takes them."""
+    """Return motions in the format of `emulator.table.batch`."""
     count_deg, tick_hz, bits = config.counts_per_deg, config.control.tick_hz, config.motion_bits
     rows = [
         (

@@ -1,4 +1,4 @@
-"""Thin out a curve of many samples for a drawing, such that the drawing stays the same."""
+"""Thin out a curve of many samples for a drawing, without a visible change."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +10,12 @@ _COLUMNS = 3000
 
 
 def envelope(time_s: Array, values: Array, columns: int = _COLUMNS) -> tuple[Array, Array]:
-    """Return of each column of the drawing the first, the last, the lowest and the highest sample, in order of time.
+    """Return, for each column of the drawing, the first, last, lowest and highest sample, in order of time.
 
     Args:
         time_s: (n,) ascending times.
         values: (n,) samples.
-        columns: Columns over the whole time.
+        columns: number of columns over the whole time.
     """
     if len(time_s) <= 4 * columns:
         return time_s, values

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from emulator.avr.chip import Chip
 from emulator.avr.compiled_table import CompiledTable
-from emulator.avr.header import MOST_EDGES_S
+from emulator.avr.header import CLOCK_HZ, MOST_EDGES_S
 from emulator.config.table_config import TableConfig, load_config
 from emulator.table.table import Table
 
@@ -41,15 +41,31 @@ TABLES: Mapping[str, str] = MappingProxyType(
 )
 """The tables that both are compared at, as the keys of a configuration that differ from the default one."""
 
-_NONSENSE = (b"Q", b"P 1e5", b"\x18", b"P" + b" " * 40, b"", b"h", b"S 0", b"A -1", b"R 1.", b"P 4194304", b"\xff 3", b"H1")
+_NONSENSE = (
+    b"Q",
+    b"P 1e5",
+    b"\x18",
+    b"P" + b" " * 40,
+    b"",
+    b"h",
+    b"S 0",
+    b"A -1",
+    b"R 1.",
+    b"P 4194304",
+    b"\xff 3",
+    b"H1",
+)
 _QUIET_TICKS = (1, 4, 20, 60, 200, 600, 2500)
 _LOADS_NM = (0.0, 0.0, 0.2, -0.2, 3.0)
-_REPLY_TICKS = 80
-"""Within which the longest reply has left."""
+
+
+_BEFORE_CARRY = 253
+"""Edges after which one more changes both bytes of the counter, which begins at the phase 2 of the encoder."""
+_CYCLES_ABOUT_A_TICK = 420
 
 
 class PartingError(Exception):
-    """The two did not do the same; the message says when and what."""
+    """Firmware and emulator differ. The message states the time and the difference."""
 
 
 @dataclass
@@ -101,6 +117,11 @@ class Pair:
         for table in (self.emulated, self.compiled):
             table.receive(line + b"\r")
 
+    def trigger(self) -> None:
+        """Put an edge on the trigger of both, between two ticks."""
+        self.emulated.trigger()
+        self.compiled.trigger()
+
     def step(self, ticks: int = 1) -> None:
         """Let ticks pass, one by one.
 
@@ -129,9 +150,11 @@ class Pair:
         for name, ours_value in ours_seen._asdict().items():
             if (theirs_value := getattr(theirs_seen, name)) != ours_value:
                 raise PartingError(f"{name} is {ours_value} at the emulator and {theirs_value} at the firmware")
-        if self.compiled.chip.lost_edges or self.compiled.overruns:
+        chip, overruns = self.compiled.chip, self.compiled.overruns
+        if chip.lost_edges or overruns or chip.duty_changes:
             raise PartingError(
-                f"the firmware lost {self.compiled.chip.lost_edges} edges and {self.compiled.overruns} ticks"
+                f"the firmware lost {chip.lost_edges} edges and {overruns} ticks, and changed the duty amid "
+                f"{chip.duty_changes} ticks"
             )
         self.replies = (self.replies[0] + ours, self.replies[1] + theirs)
 
@@ -146,7 +169,9 @@ def run_lockstep(config: TableConfig, ticks: int, seed: int, firmware: Path | No
     pair, done = Pair(config, seed, firmware), Lockstep()
     while done.ticks < ticks:
         _disturb(pair, chance)
-        for _ in range(chance.choice((1, 1, 1, 2))):  # more replies would wait for each other, on both lines differently
+        for _ in range(
+            chance.choice((1, 1, 1, 2))
+        ):  # more replies would wait for each other, on both lines differently
             line = random_line(chance, config)
             pair.send(line)
             done.lines += 1
@@ -166,8 +191,7 @@ def run_lockstep(config: TableConfig, ticks: int, seed: int, firmware: Path | No
 def _disturb(pair: Pair, chance: Random) -> None:
     """Now and then let something come that is not on the line."""
     if chance.random() < 0.2:
-        pair.emulated.trigger()
-        pair.compiled.trigger()
+        pair.trigger()
     if chance.random() < 0.05:
         load_Nm = chance.choice(_LOADS_NM)
         pair.emulated.set_load_torque(load_Nm)
@@ -187,14 +211,17 @@ def random_line(chance: Random, config: TableConfig) -> bytes:
     if verb in "HL":
         return verb.encode()
     scale = {"P": 300.0, "R": 40.0, "S": 1.1 * limits.speed_deg_s, "A": 1.1 * limits.acceleration_deg_s2}[verb]
+    if verb in "SA" and chance.random() < 0.4:
+        return f"{verb} {scale / 1.1:.1f}".encode()
     value = scale * chance.choice((1.0, 1.0, 0.05, 0.0005)) * chance.random()
     sign = chance.choice(("", "", "+", "-")) if verb in "PR" else ""
     return f"{verb}{' ' * chance.randint(0, 2)}{sign}{value:.{digits}f}".encode()
 
 
 def run_edges(config: TableConfig, ticks: int, edges_s: int = MOST_EDGES_S, firmware: Path | None = None) -> Chip:
-    """Turn the shaft at a constant speed both ways, at any cycle of a tick, while the controller brakes and the line is
-    busy, and return the controller.
+    """Turn the shaft at a constant speed both ways, and return the controller, which moves, brakes and answers lines.
+
+    The edges come at any cycle of a tick, also while it is sampled.
 
     Raises:
         PartingError: its count is not that of the edges.
@@ -222,10 +249,30 @@ def run_edges(config: TableConfig, ticks: int, edges_s: int = MOST_EDGES_S, firm
     return chip
 
 
+def run_phases(config: TableConfig, firmware: Path | None = None) -> None:
+    """Let an edge that changes both bytes of the 16-bit counter fall on each cycle about a tick.
+
+    Raises:
+        PartingError: the tick's sample is torn.
+    """
+    chip = CompiledTable(config, 0, firmware).chip
+    chip.unguard()
+    place = 0.5
+    for _ in range(_BEFORE_CARRY):
+        chip.tick(place, 1.0, place + 1.0, 1)
+        place += 1.0
+    tick_cycles = CLOCK_HZ // config.control.tick_hz
+    for cycle in range(tick_cycles - _CYCLES_ABOUT_A_TICK, tick_cycles):
+        share = cycle / tick_cycles
+        chip.tick(place, 0.5 / share, place + 0.5 / share, 1)  # at this share the shaft is at the edge
+        _check_count(chip, place + 0.5, most=1)
+        chip.tick(place + 1.0, -1.0, place, -1)
+
+
 def _check_count(chip: Chip, counted: float, most: int) -> None:
     count = chip.number("encoder_position", "<i")
-    if abs(count - counted) > most:
-        raise PartingError(f"the firmware counts {count} of {counted:g} edges")
+    if abs(count - math.floor(counted)) > most:
+        raise PartingError(f"the firmware counts {count} of {math.floor(counted)} edges")
 
 
 def _limits(config: TableConfig) -> tuple[float, float]:

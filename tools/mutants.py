@@ -1,11 +1,11 @@
-"""Random mutation of the emulated table: what does the conformance suite not find?
+"""Random mutations of the emulated table that the conformance suite does not find.
 
 `python -m tools.mutants --seed N --count N` changes one operator, constant, condition or statement of the table's code
-at a time, in memory, and runs the suite against that table until a case fails. It prints mutants that pass. Those that
+at a time, in memory. It runs the suite against that table until a case fails. It prints mutants that pass. Those that
 may pass are listed with the reason in `mutants.toml`.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the imports that take long
+import protocol.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -28,30 +28,30 @@ from tools.mutation import COMPILED, MODULES, Mutation, mutations_of, planted
 
 EXPLAINED = Path(__file__).with_name("mutants.toml")
 _CPU_S = 60
-"""Of computing time, of which a whole run takes about 15 s: a mutant that takes so long hangs."""
+"""Maximum computing time of a mutant; a whole run takes about 15 s."""
 
 
 class Explanation(NamedTuple):
-    """Why mutants may come through: all of a place, or only changes there that contain some text."""
+    """Reason why mutants may survive: all of a function or class, or only changes with some text."""
 
     where: str
     change: str
     reason: str
 
     def holds_for(self, mutation: Mutation) -> bool:
-        """Return whether it is about a mutation: in this function or class, and with this text in its change."""
+        """Return whether it applies to a mutation: in this function or class, and with this text in its change."""
         return f"{mutation.where}.".startswith(f"{self.where}.") and self.change in mutation.change
 
 
 def explanations(file: Path = EXPLAINED) -> list[Explanation]:
-    """Return what the file says of mutants that may come through."""
+    """Return the content of the file of mutants that may survive."""
     entries = tomllib.loads(file.read_text(encoding="utf-8"))["may"]
     return [Explanation(entry["where"], entry.get("change", ""), entry["reason"]) for entry in entries]
 
 
 def verdict_on(mutation: Mutation, seed: int) -> str:
-    """Plant a mutation in this process, and return which case fails and how, or nothing if all pass."""
-    from emulator.protocol_emulator import RUN, Serial  # noqa: PLC0415 - the mutation is planted in what is loaded
+    """Apply a mutation in this process, and return which case fails and how, or nothing if all pass."""
+    from emulator.protocol_emulator import RUN, Serial  # noqa: PLC0415 - the mutation is applied to the loaded modules
     from protocol.conformance.bench.stand import InProcess  # noqa: PLC0415
     from protocol.conformance.bench.wire import RecordedPort  # noqa: PLC0415
     from protocol.conformance.cases.catalog import all_cases  # noqa: PLC0415
@@ -65,7 +65,7 @@ def verdict_on(mutation: Mutation, seed: int) -> str:
     try:
         port = Serial("emulator://", timeout=1)
         session = Session(RecordedPort(port), load_profile(), InProcess(port.table), seed)
-        for case in sorted(all_cases(), key=lambda case: case.travel_deg):  # those that take little time first
+        for case in sorted(all_cases(), key=lambda case: case.travel_deg):  # the fast ones first
             outcome = session.run_case(case)
             if outcome.verdict in {Verdict.FAIL, Verdict.ERROR}:
                 return f"{case.id}: {outcome.reason}"
@@ -77,7 +77,7 @@ def verdict_on(mutation: Mutation, seed: int) -> str:
 
 
 def verdict_in_a_process(index: int, seed: int) -> str:
-    """Return the verdict on a mutation from a process of its own: it may hang or crash."""
+    """Return the verdict on a mutation from a separate process, because it may hang or crash."""
     command = own_program("tools.mutants", "--only", str(index), "--seed", str(seed))
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=own_environment())
     if done.returncode:
@@ -86,9 +86,9 @@ def verdict_in_a_process(index: int, seed: int) -> str:
 
 
 def hunt(count: int, seed: int) -> Iterator[tuple[Mutation, str]]:
-    """Yield random mutations, each with what the suite says of it: nothing if it came through."""
+    """Yield random mutations, each with the result of the suite: nothing if it survived."""
     mutations = list(enumerate(mutations_of(MODULES)))
-    chosen = Random(seed).sample(mutations, min(count, len(mutations)))  # noqa: S311 - no secret
+    chosen = Random(seed).sample(mutations, min(count, len(mutations)))  # noqa: S311 - not for security
     with share_shown("mutants") as progress:
         for number, (index, mutation) in enumerate(chosen):
             progress(number / len(chosen))
@@ -113,14 +113,14 @@ def _run(options: argparse.Namespace) -> int:
             else:
                 unexplained.append(mutation)
             if options.verbose or not (verdict or reason):
-                print(f"{mutation}: {verdict[:160] or reason or 'CAME THROUGH'}", flush=True)
+                print(f"{mutation}: {verdict[:160] or reason or 'SURVIVED'}", flush=True)
     finally:
-        print(f"{caught} caught, {explained} came through and may, {len(unexplained)} came through")
+        print(f"{caught} caught, {explained} survived with a reason, {len(unexplained)} survived")
     return int(bool(unexplained))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line, and return the exit status: 1 if a mutant came through without a reason."""
+    """Run the command line, and return the exit status: 1 if a mutant survived without a reason."""
     parser = Parser(
         prog=program_name("tools.mutants"),
         description="random mutants of the emulated table that the suite does not catch",

@@ -1,4 +1,4 @@
-"""Mutations of a module's source, one small change each, and how one is planted in the running program."""
+"""Small mutations of a module's source, and their application in the running program."""
 
 import ast
 import importlib
@@ -25,7 +25,7 @@ MODULES = (
     "protocol.codec",
     "protocol.line_buffer",
 )
-"""What the firmware of the emulated table consists of; its plant is not what the suite tests."""
+"""The modules of the firmware of the emulated table; the suite does not test its plant."""
 
 COMPILED = (
     "emulator.int32",
@@ -35,7 +35,7 @@ COMPILED = (
     "emulator.firmware.pid",
     "emulator.firmware.profiler",
 )
-"""Those of which numba compiles functions."""
+"""The modules with functions that numba compiles."""
 
 _SWAPPED: dict[type[ast.AST], type[ast.AST]] = {
     ast.Lt: ast.LtE,
@@ -65,7 +65,7 @@ _SKIPPED = (ast.Raise, ast.Assert, ast.Import, ast.ImportFrom, ast.AnnAssign)
 
 
 class Mutation(NamedTuple):
-    """One change of a module: in which function, and of which statement, before and after."""
+    """One change of a module: its function, and the statement before and after."""
 
     where: str
     change: str
@@ -82,7 +82,7 @@ def mutations_of(modules: Sequence[str]) -> list[Mutation]:
 
 
 def planted(mutation: Mutation) -> None:
-    """Let the emulator use a mutated copy of a module; the client's side and the kit keep the module as it is."""
+    """Make the emulator use a mutated copy of a module; the client and the kit keep the original."""
     original = importlib.import_module(mutation.module)
     mutated = ModuleType(mutation.module)
     mutated.__file__ = original.__file__
@@ -116,7 +116,7 @@ def _compiled(tree: ast.Module, module: ModuleType) -> CodeType:
 
 
 def _mutated(module: str) -> Iterator[tuple[Mutation, ast.Module]]:
-    """Yield each mutation with the module's tree, which has it until the next one is asked for."""
+    """Yield each mutation with the module's tree, which contains it until the next one is requested."""
     tree = ast.parse(inspect.getsource(importlib.import_module(module)))
     for where, statement in _statements(tree, module):
         before = ast.unparse(statement).partition("\n")[0]
@@ -151,7 +151,7 @@ def _nodes(statement: ast.stmt) -> Iterator[ast.AST]:
 
 
 def _changes(node: ast.AST) -> Iterator["Undo"]:
-    """Change a node in each way that there is, and yield what undoes it."""
+    """Apply each possible change to a node, and yield the function that undoes it."""
     for field in ("op", "ops"):
         operator = getattr(node, field, None)
         first = operator[0] if isinstance(operator, list) else operator
@@ -172,12 +172,12 @@ def _changes(node: ast.AST) -> Iterator["Undo"]:
 
 
 class Undo:
-    """A change of one field of a node, made at once; calling it takes the change back."""
+    """A change of one field of a node, made at once; a call undoes it."""
 
     def __init__(self, node: ast.AST, field: str, value: object) -> None:
         self._node, self._field, self._before = node, field, getattr(node, field)
         setattr(node, field, value)
 
     def __call__(self) -> None:
-        """Take the change back."""
+        """Undo the change."""
         setattr(self._node, self._field, self._before)

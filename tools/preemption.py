@@ -1,6 +1,6 @@
-"""A motion that new commands pre-empt again and again (Fig. 4 of the paper), on a real pty, drawn.
+"""Draw a motion that new commands pre-empt repeatedly (Fig. 4 of the paper), on a real pty.
 
-Starts the emulator as a program of its own and opens the port that it prints with pyserial.
+Starts the emulator as a separate program and opens the port that it prints with pyserial.
 """
 
 import subprocess
@@ -13,29 +13,29 @@ from emulator.trace import read_trace
 from planner.plot_style import save_picture
 from protocol import TableClient
 from protocol.own_program import own_environment, own_program
-from tools.plot_trace import draw_trace
+from tools.trace_figure import draw_trace
 
-STEPS = (  # after how many seconds, top speed deg/s, acceleration deg/s2, target deg
+STEPS = (  # time in seconds, maximum speed deg/s, acceleration deg/s2, target deg
     (0.0, 20.0, 20.0, 60.0),
-    (1.8, 35.0, 40.0, 120.0),  # faster, in full motion
+    (1.8, 35.0, 40.0, 120.0),  # faster, at full speed
     (0.9, 10.0, 40.0, 120.0),  # slower: it brakes at A, no step
-    (1.4, 30.0, 30.0, 20.0),  # behind: it brakes, turns and comes back
+    (1.4, 30.0, 30.0, 20.0),  # behind: it brakes, reverses and returns
     (1.6, 15.0, 60.0, 45.0),  # behind again
 )
 END_DEG = STEPS[-1][-1]
 
 
 def draw_preemption(out: Path) -> Path:
-    """Drive the motion over a pty, and return the picture of what the table did; trace and picture go to `out`.
+    """Run the motion over a pty, and return the picture of the table's motion; trace and picture go to `out`.
 
     Raises:
         OSError: the emulator cannot be started, or a file cannot be written.
-        TableError: the table did not do its part.
+        TableError: the table failed.
     """
-    with stand_in("--pty", "--trace", str(out / "trace.csv")) as port, TableClient.open(port) as table:
+    with start_emulator("--pty", "--trace", str(out / "trace.csv")) as port, TableClient.open(port) as table:
         _drive(table)
     figure = draw_trace(
-        read_trace(out / "trace.csv"), "A motion pre-empted in full run: the reference's speed never jumps"
+        read_trace(out / "trace.csv"), "A motion pre-empted at full speed: the speed of the reference has no steps"
     )
     picture = out / "preemption.png"
     save_picture(figure, picture)
@@ -54,10 +54,10 @@ def _drive(table: TableClient) -> None:
 
 
 @contextmanager
-def stand_in(*arguments: str) -> Iterator[str]:
-    """Run the emulator as a program of its own and yield its port's name; what it records is complete afterwards.
+def start_emulator(*arguments: str) -> Iterator[str]:
+    """Run the emulator as a separate program and yield its port's name; its recording is complete afterwards.
 
-    Ctrl-C at the terminal does not reach it: the table has to be there to be stopped.
+    Ctrl-C at the terminal does not reach the emulator: it must still run when the table is stopped.
     """
     command = own_program("emulator", *arguments)
     with subprocess.Popen(

@@ -1,9 +1,9 @@
-"""Long runs of the emulator, each with what must hold at its end: `python -m tools.soak noise day year clients wrap`.
+"""Long runs of the emulator, each with its invariants: `python -m tools.soak noise day year clients wrap`.
 
-A soak is small in the tests and full here; both run these functions.
+The tests run each soak at a small size; here it has its full size.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the imports that take long
+import protocol.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -32,18 +32,18 @@ _TICK_HZ = 1000
 
 
 class Soak(NamedTuple):
-    """What was done and what was found: named figures, and what went wrong."""
+    """The result of a soak: named figures, and failures."""
 
     figures: dict[str, str]
     faults: list[str]
 
 
 def soak_noise(size: float, seed: int) -> Soak:
-    """Send random bytes in pieces of random size; no reply may be out of place, and the table may not move.
+    """Send random bytes in pieces of random size. All replies must be in order, and the table must not move.
 
-    Random bytes now and then say `P5` or `R-3`: those letters are left out, so that nothing asks for a motion.
+    Random bytes sometimes contain `P5` or `R-3`: those letters are removed, so that nothing commands a motion.
     """
-    chance = Random(seed)  # noqa: S311 - noise is no secret
+    chance = Random(seed)  # noqa: S311 - not for security
     table = Table(load_config().with_serial(baud=0), seed)
     alphabet = bytes(byte for byte in range(256) if byte not in b"PR")
     before = table.status().encoder_deg
@@ -76,18 +76,18 @@ def soak_noise(size: float, seed: int) -> Soak:
 
 
 def soak_day(hours: float, seed: int) -> Soak:
-    """Let random commands run for simulated hours, most of them in motion; see `_soak_motions`."""
+    """Run random commands for simulated hours, most of them in motion; see `_soak_motions`."""
     return _soak_motions(hours, seed, pauses_ticks=(20, 200, 2000, 20_000, 100_000))
 
 
 def soak_year(days: float, seed: int) -> Soak:
-    """Let random commands run for simulated days, mostly at rest: about thirty a day; see `_soak_motions`."""
+    """Run random commands for simulated days, mostly at rest, about thirty a day; see `_soak_motions`."""
     return _soak_motions(24 * days, seed, pauses_ticks=(200, 20_000, 200_000, 3_600_000, 10_000_000))
 
 
 def _soak_motions(hours: float, seed: int, pauses_ticks: Sequence[int]) -> Soak:
-    """Let random commands run for simulated hours: memory stays flat, count and true angle never drift apart."""
-    chance = Random(seed)  # noqa: S311 - no secret
+    """Run random commands for simulated hours: memory must not grow, and count and true angle must not drift apart."""
+    chance = Random(seed)  # noqa: S311 - not for security
     config = load_config()
     table = Table(config, seed, run=FastTicks())
     half_gap_deg = config.gears.backlash_arcmin / 60 / 2
@@ -102,7 +102,7 @@ def _soak_motions(hours: float, seed: int, pauses_ticks: Sequence[int]) -> Soak:
         worst_deg = max(worst_deg, abs(status.encoder_deg - status.true_deg))
         if commands % 100 == 0:
             sizes_kB.append(_memory_kB())
-    # The encoder's own step, and where the shaft stood between two of them, come on top of the gap.
+    # The resolution of the encoder, and the initial position of the shaft between two counts, add to the gap.
     allowed_deg = 2 * half_gap_deg + 2 / config.counts_per_deg
     growth_kB = sizes_kB[-1] - sizes_kB[len(sizes_kB) // 4] if sizes_kB else 0  # after the first quarter
     figures = {
@@ -116,10 +116,10 @@ def _soak_motions(hours: float, seed: int, pauses_ticks: Sequence[int]) -> Soak:
 
 
 def soak_clients(count: float, seed: int) -> Soak:
-    """Let clients come and go on a pty, some of them in mid-line; each finds a table that answers."""
-    chance = Random(seed)  # noqa: S311 - no secret
+    """Connect and disconnect clients on a pty, some of them within a line. Each must have its replies."""
+    chance = Random(seed)  # noqa: S311 - not for security
     faults: list[str] = []
-    with tempfile.TemporaryDirectory() as folder, _stand_in(Path(folder) / "table") as (link, process):
+    with tempfile.TemporaryDirectory() as folder, _emulator(Path(folder) / "table") as (link, process):
         descriptors = _descriptors(process)
         for index in range(round(count)):
             try:
@@ -140,7 +140,7 @@ def soak_clients(count: float, seed: int) -> Soak:
 
 
 def soak_wrap(count: float, seed: int) -> Soak:
-    """Let the counter run over its end in motion, both ways, again and again: the motion goes on."""
+    """Move the counter past its limit in both directions, repeatedly: the motion must continue."""
     config = load_config().with_serial(baud=0)
     table, counts_per_deg = Table(config, seed), config.counts_per_deg
     faults = []
@@ -162,14 +162,14 @@ SOAKS: dict[str, tuple[Callable[[float, int], Soak], float, str]] = {
     "noise": (soak_noise, 10_000_000, "random bytes"),
     "day": (soak_day, 24.0, "simulated hours of random commands"),
     "year": (soak_year, 365.0, "simulated days of random commands, mostly at rest"),
-    "clients": (soak_clients, 1000, "clients that come and go on a pty"),
-    "wrap": (soak_wrap, 100, "runs over the end of the counter"),
+    "clients": (soak_clients, 1000, "clients that connect and disconnect on a pty"),
+    "wrap": (soak_wrap, 100, "runs past the limit of the counter"),
 }
-"""Each soak by its name: what runs it, its full size, and the unit of that."""
+"""Each soak by its name: its function, its full size, and the unit of that size."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the named soaks; return 1 when something did not hold."""
+    """Run the named soaks; return 1 if an invariant failed."""
     parser = Parser(
         prog=program_name("tools.soak"),
         description="Run the emulator for a long time, and check the invariants.",
@@ -215,7 +215,7 @@ def _descriptors(process: "subprocess.Popen[str]") -> int:
 
 
 @contextmanager
-def _stand_in(link: Path) -> "Iterator[tuple[str, subprocess.Popen[str]]]":
+def _emulator(link: Path) -> "Iterator[tuple[str, subprocess.Popen[str]]]":
     """Run an emulator on a pty under a link."""
     command = own_program("emulator", "--pty", "--link", str(link), "--baud", "0")
     with subprocess.Popen(

@@ -10,6 +10,7 @@ from emulator.avr.errors import ChipError, ToolchainError
 from emulator.avr.toolchain import build_simulator
 
 _MOST_SENT = 256
+_RAM_END = 0x900
 _FAILURES = {
     -1: "its tick did not come",
     -2: "its program crashed",
@@ -26,6 +27,7 @@ class _Shown(ctypes.Structure):
         ("tick_cycles", ctypes.c_uint64),
         ("ticks", ctypes.c_uint32),
         ("lost_edges", ctypes.c_uint32),
+        ("duty_changes", ctypes.c_uint32),
         ("overrun_bytes", ctypes.c_uint32),
         ("line_count", ctypes.c_int32),
         ("sent_count", ctypes.c_uint32),
@@ -113,12 +115,17 @@ class Chip:
     @property
     def mean_tick(self) -> float:
         """The cycles of the mean tick, interrupts included."""
-        return float(self._shown.tick_cycles) / max(1, self._shown.ticks)
+        return float(self._shown.tick_cycles) / max(1, int(self._shown.ticks))
 
     @property
     def lost_edges(self) -> int:
         """Edges of the encoder whose interrupt still waited for the one before."""
         return int(self._shown.lost_edges)
+
+    @property
+    def duty_changes(self) -> int:
+        """Ticks amid which the duty on the bridge became another."""
+        return int(self._shown.duty_changes)
 
     @property
     def overrun_bytes(self) -> int:
@@ -130,8 +137,14 @@ class Chip:
         """Whether a byte is on its way out."""
         return bool(self._shown.line_count)
 
+    @property
+    def stack_bytes(self) -> int:
+        """The deepest that the stack has been: memory that was never used is 0."""
+        size = _RAM_END - (self._program.symbols["_end"] - DATA_SPACE)
+        return len(self.memory("_end", size).lstrip(b"\0"))
+
     def take_sent(self) -> bytes:
-        """Return the bytes whose stop bit has left, and forget them."""
+        """Return and remove the bytes whose stop bit has been sent."""
         count = self._shown.sent_count
         if not count:
             return b""

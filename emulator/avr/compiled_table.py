@@ -64,9 +64,9 @@ class CompiledTable:
 
     Attributes:
         config: the table's constants, those that the firmware was built for.
-        facts: those that its clients may rely on.
-        tick: ticks since it was switched on.
-        observer: who sees every tick, if anybody.
+        facts: the constants that its clients may use.
+        tick: ticks since power-on.
+        observer: called after every tick, if set.
         chip: the simulated controller.
 
     Raises:
@@ -84,7 +84,7 @@ class CompiledTable:
             seed: places shaft and gear teeth, as in `emulator.Table`.
             firmware: an ELF file; without it the firmware is built for the table.
         """
-        chance = random.Random(seed)  # noqa: S311  # where a gear stands is no secret
+        chance = random.Random(seed)  # noqa: S311  # not for security
         tick_hz = config.control.tick_hz
         self._refuse_faults(config.faults)
         self.config = config
@@ -105,11 +105,11 @@ class CompiledTable:
         self._switch_on(0)
 
     def receive(self, data: bytes) -> None:
-        """Take bytes that the client puts on the line now."""
+        """Take bytes that the client sends now."""
         self._incoming.queue.extend(data)
 
     def transmit(self) -> bytes:
-        """Return the bytes that have left by now, and forget them."""
+        """Return and remove the bytes that have been sent by now."""
         sent, self._sent = self._sent, b""
         return sent
 
@@ -120,7 +120,7 @@ class CompiledTable:
 
     @property
     def received_queue(self) -> int:
-        """Bytes on their way to the firmware."""
+        """Bytes in transmission to the firmware."""
         head, tail, _, _ = self._ring_indices()
         return len(self._incoming.queue) + (head - tail) % 256
 
@@ -170,13 +170,13 @@ class CompiledTable:
             self._triggers.add_edge(self.tick, fraction)
 
     def set_load_torque(self, torque_Nm: float) -> None:
-        """Load the table with a torque that resists positive rotation, until it is set anew."""
+        """Apply a load torque that opposes positive rotation, until the next call."""
         if not math.isfinite(torque_Nm):
             raise ValueError(f"a load torque of {torque_Nm} Nm is not finite")
         self._load_torque_Nm, self._resting = float(torque_Nm), False
 
     def reset(self, count: int = 0) -> None:
-        """Switch the table off and on: the controller wakes at `count` where the plant is; the plant goes on.
+        """Switch the table off and on. The controller starts at `count`, and the plant continues.
 
         A count other than 0 is written by a debugger that halts at main(); a controller of its own begins at 0.
         """
@@ -187,7 +187,7 @@ class CompiledTable:
         self._switch_on(count)
 
     def advance(self, ticks: int) -> None:
-        """Let simulated time pass."""
+        """Advance the simulated time."""
         if ticks < 0:
             raise ValueError(f"time cannot go back by {-ticks} ticks")
         end = self.tick + ticks
@@ -214,7 +214,7 @@ class CompiledTable:
         """Return what can be seen of the table now: plant and pins, and what a debugger reads."""
         config, now, drive = self.config, self.controller(), self._drive
         count_deg, bits = config.counts_per_deg, config.motion_bits
-        speed_deg_s = config.control.tick_hz / count_deg  # of one count a tick
+        speed_deg_s = config.control.tick_hz / count_deg  # speed of one count per tick
         head, tail, queued, left = self._ring_indices()
         return TableStatus(
             tick=self.tick,

@@ -11,12 +11,13 @@ _SEGMENT = struct.Struct("<IIIIIIII")
 _SECTION = struct.Struct("<IIIIIIIIII")
 _SYMBOL = struct.Struct("<IIIBBH")
 _AVR = 83
+_MOST_FLASH = 1 << 17
 _LOADED = 1
 _SYMBOL_TABLE = 2
 
 
 class ElfError(ValueError):
-    """The file is not an ELF file for an AVR controller; the message says why."""
+    """The file is not an ELF file for an AVR controller. The message states the reason."""
 
 
 class Program(NamedTuple):
@@ -48,6 +49,8 @@ def _program(data: bytes) -> Program:
     for index in range(segments):
         kind, offset, _, address, size, *_ = _SEGMENT.unpack_from(data, segments_at + index * segment_size)
         if kind == _LOADED and size and address < DATA_SPACE:
+            if address + size > _MOST_FLASH or offset + size > len(data):
+                raise ElfError("its program does not fit a controller")
             flash.extend(b"\xff" * (address + size - len(flash)))
             flash[address : address + size] = data[offset : offset + size]
     headers = [_SECTION.unpack_from(data, sections_at + index * section_size) for index in range(sections)]

@@ -2,8 +2,11 @@
 
 
 class ToolchainError(Exception):
-    """The firmware cannot be built or run on this machine, or is for another table; the message says what to do."""
+    """The firmware cannot be built or run on this machine, or is for another table.
+
+    The message states the next step.
+    """
 
 
 class ChipError(Exception):
-    """The simulated controller stopped; the message says why."""
+    """The simulated controller stopped. The message states the reason."""

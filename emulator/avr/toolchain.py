@@ -1,7 +1,7 @@
 """Building the firmware, and the simulator's library, with the compilers of the distribution.
 
-What was built is kept in the user's cache folder under a digest of everything that it was made of, and appears there
-only when it is whole.
+Build results are stored in the user's cache folder under a digest of all their inputs. A result appears there only when
+it is complete.
 """
 
 import hashlib
@@ -14,12 +14,13 @@ from tempfile import TemporaryDirectory
 from emulator.avr.errors import ToolchainError
 from emulator.avr.header import header_text
 from emulator.config.table_config import TableConfig
-from protocol.kept_code import cache_root
+from protocol.kept_file import cache_root
 from protocol.whole_file import whole_file
 
 FIRMWARE = Path(__file__).with_name("firmware")
 CONSTANTS = FIRMWARE / "table_constants.h"
 _SHIM = Path(__file__).with_name("host") / "chip.c"
+_GAINS = "gains.h"
 _HEADERS = Path("/usr/include/simavr/sim_avr.h")
 _INSTALL = "install the packages gcc, gcc-avr, avr-libc and libsimavr-dev (apt-get install ...)"
 
@@ -39,26 +40,34 @@ def lacking() -> str:
     return "" if _HEADERS.is_file() else f"libsimavr-dev is not installed; {_INSTALL}"
 
 
-def build_firmware(config: TableConfig, sources: Path = FIRMWARE) -> Path:
+def build_firmware(config: TableConfig, sources: Path = FIRMWARE, gains: Path | None = None) -> Path:
     """Return the ELF file of the firmware for a configured table.
+
+    Args:
+        config: the table.
+        sources: the folder of the firmware's sources.
+        gains: `gains.h` of `tools.tune`, in place of the configured gains.
 
     Raises:
         ConfigError: the controller cannot run such a table.
         ToolchainError: it cannot be built.
+        OSError: a source cannot be read.
     """
-    header = header_text(config, "a table's configuration")
-    digest = hashlib.sha256()
-    for part in (_version("avr-gcc"), " ".join(COMPILE), header):
-        digest.update(part.encode())
-    for source in sorted(sources.glob("*.[ch]")):
-        digest.update(source.name.encode() + source.read_bytes())
+    files = {source.name: source.read_bytes() for source in sorted(sources.glob("*.[ch]"))}
+    files[CONSTANTS.name] = header_text(config, "a table's configuration").encode("ascii")
+    options = list(COMPILE)
+    if gains is not None:
+        files[_GAINS] = gains.read_bytes()
+        options += ["-include", _GAINS]
+    digest = hashlib.sha256(f"{_version('avr-gcc')}{options}".encode())
+    for name, content in files.items():
+        digest.update(f"{name} {len(content)}\n".encode() + content)
     built = _folder() / f"table-{digest.hexdigest()[:24]}.elf"
     if not built.is_file():
         with TemporaryDirectory() as folder:
-            for source in sources.glob("*.[ch]"):
-                (Path(folder) / source.name).write_bytes(source.read_bytes())
-            (Path(folder) / CONSTANTS.name).write_text(header, encoding="ascii")
-            _compile(built, [*COMPILE, *sorted(map(str, Path(folder).glob("*.c")))])
+            for name, content in files.items():
+                (Path(folder) / name).write_bytes(content)
+            _compile(built, [*options, f"-I{folder}", *(f"{folder}/{name}" for name in files if name.endswith(".c"))])
     return built
 
 

@@ -1,4 +1,4 @@
-"""The constants of plant and controller, per tick and in the firmware's formats, from a table's configuration."""
+"""The constants of plant and controller from a table's configuration, per tick and in the firmware's formats."""
 
 from emulator.config.table_config import ConfigError, GainsConfig, TableConfig
 from emulator.firmware.controller import Firmware
@@ -32,15 +32,15 @@ def drive_constants(config: TableConfig) -> DriveTrain:
 
 
 def encoder_constants(config: TableConfig, phase: float) -> Encoder:
-    """Return the encoder of a configured table; `phase` (0..1) says where between two edges the shaft stands."""
+    """Return the encoder of a configured table. `phase` (0..1) is the position of the shaft between two edges."""
     return Encoder.of(config.encoder.lines, phase)
 
 
 def firmware_constants(config: TableConfig) -> Firmware:
-    """Return the controller of a configured table, its gains rounded to the firmware's formats.
+    """Return the controller of a configured table, with its gains rounded to the firmware's formats.
 
     Raises:
-        ConfigError: A gain does not fit its register, or the integral gain rounds to nothing.
+        ConfigError: a gain does not fit its register, or the integral gain rounds to 0.
     """
     tick_hz = config.control.tick_hz
     settling, protection, gains, bits = config.settling, config.protection, config.gains, config.motion_bits
@@ -60,10 +60,10 @@ def firmware_constants(config: TableConfig) -> Firmware:
 
 
 def fixed_gains(config: TableConfig, gains: GainsConfig) -> Gains:
-    """Return a gain set of a table as the firmware holds it.
+    """Return a gain set of a table in the firmware's formats.
 
     Raises:
-        ConfigError: A gain does not fit its register, or the integral gain rounds to nothing.
+        ConfigError: a gain does not fit its register, or the integral gain rounds to 0.
     """
     try:
         return Gains(*gain_registers(*config.gains_per_tick(gains)))

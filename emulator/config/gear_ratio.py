@@ -1,13 +1,13 @@
-"""A gear ratio as the fraction of integers that its teeth make: 2197/27 or 4989/10, and never 81.37037."""
+"""A gear ratio as the exact fraction of its numbers of teeth: 2197/27 or 4989/10, not 81.37037."""
 
 import math
 from fractions import Fraction
 
 
 def simplest_fraction(value: float) -> Fraction:
-    """Return the fraction with the smallest denominator among those to which `value` (> 0) is the nearest float.
+    """Return the fraction with the smallest denominator among those whose nearest float is `value` (> 0).
 
-    So a float stands for the fraction that it was made of: 2197 / 27 for 2197/27, and 498.9 for 4989/10.
+    So a float gives the fraction from which it was computed: 2197 / 27 gives 2197/27, and 498.9 gives 4989/10.
     """
     exact = Fraction(value)
     below, above = Fraction(math.nextafter(value, 0.0)), Fraction(math.nextafter(value, math.inf))
@@ -15,7 +15,7 @@ def simplest_fraction(value: float) -> Fraction:
 
 
 def _simplest_between(low: Fraction, high: Fraction) -> Fraction:
-    """Return the fraction with the smallest denominator from `low` to `high`, by their continued fraction."""
+    """Return the fraction with the smallest denominator from `low` to `high`, by continued fractions."""
     whole = math.ceil(low)
     if whole <= high:
         return Fraction(whole)

@@ -1,6 +1,6 @@
-"""The table's constants: one frozen value per section of the TOML file, each number with its unit and its range.
+"""The table's constants: one frozen dataclass per section of the TOML file. Each number has its unit and its range.
 
-The numbers themselves, and where each comes from, are in `default.toml`.
+The numbers and their sources are in `default.toml`.
 """
 
 from dataclasses import asdict, dataclass, replace
@@ -26,7 +26,7 @@ _COARSER = "a lower encoder.lines or gears.ratio, a higher control.tick_hz or a 
 
 
 class ConfigError(ValueError):
-    """A configuration that cannot be used; the message names the file, the key and what is allowed."""
+    """A configuration that cannot be used. The message names the file, the key and the allowed values."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class DriverConfig:
 
 @dataclass(frozen=True)
 class GearsConfig:
-    """The spur gear chain between motor and table."""
+    """The spur gears between motor and table."""
 
     ratio: float = quantity(at_least=1, at_most=1e5, fraction=True)
     efficiency: float = quantity(at_least=0.01, at_most=1)
@@ -64,7 +64,7 @@ class GearsConfig:
 
 @dataclass(frozen=True)
 class DiscConfig:
-    """The table's disc with the workpiece on it."""
+    """The disc of the table with the workpiece."""
 
     inertia_kg_m2: float = quantity(at_least=1e-9, at_most=1e6)
     bearing_friction_Nm: float = quantity(at_least=0, at_most=1e5)
@@ -72,7 +72,7 @@ class DiscConfig:
 
 @dataclass(frozen=True)
 class FrictionConfig:
-    """Friction of motor and gears at the motor's shaft."""
+    """Friction of motor and gears, at the motor's shaft."""
 
     coulomb_Nm: float = quantity(at_least=0, at_most=1e3)
     stiction_ratio: float = quantity(at_least=1, at_most=10)
@@ -114,7 +114,7 @@ class GainSetsConfig:
 
 @dataclass(frozen=True)
 class SettlingConfig:
-    """How the table is brought to its target once the profile has ended."""
+    """How the table reaches its target after the end of the profile."""
 
     arrival_count: int = quantity(at_least=0, at_most=100)
     arrival_time_s: float = quantity(at_least=0, at_most=10)
@@ -124,7 +124,7 @@ class SettlingConfig:
 
 @dataclass(frozen=True)
 class ProtectionConfig:
-    """When a motor that does not turn is switched off."""
+    """When the motor is switched off because it does not turn."""
 
     stall_duty: float = quantity(above=0, at_most=1)
     stall_time_s: float = quantity(above=0, at_most=3600)
@@ -150,7 +150,7 @@ class SerialConfig:
 
 @dataclass(frozen=True)
 class TableConfig:
-    """Every constant of the table. The file of each default value states its source."""
+    """All constants of a table. The file of the default values states the source of each."""
 
     motor: MotorConfig
     driver: DriverConfig
@@ -165,11 +165,11 @@ class TableConfig:
     limits: MotionConfig
     power_on: MotionConfig
     serial: SerialConfig
-    faults: tuple[Fault, ...] = ()  # [[faults]] of a file; none are shipped
+    faults: tuple[Fault, ...] = ()  # [[faults]] of a file; the default file has none
 
     @cached_property
     def counts_per_turn(self) -> Fraction:
-        """Encoder counts in one turn of the table, exactly: quadrature counts each line four times."""
+        """Exact encoder counts per turn of the table: quadrature gives four counts per line."""
         return 4 * self.encoder.lines * simplest_fraction(self.gears.ratio)
 
     @cached_property
@@ -191,17 +191,17 @@ class TableConfig:
         )
 
     def gains_per_tick(self, gains: GainsConfig) -> tuple[float, float, float]:
-        """Return K, K / Ti and K Td as one tick applies them: PWM steps for a speed error of one count a window."""
+        """Return K, K / Ti and K Td per tick: PWM steps for a speed error of one count per window."""
         tick_s = 1.0 / self.control.tick_hz
         error_unit_deg_s = 360.0 / float(self.counts_per_turn) / (self.control.speed_window_ticks * tick_s)
         gain = gains.proportional_duty_s_deg * self.driver.duty_max * error_unit_deg_s
         return gain, gain * tick_s / gains.integral_time_s, gain * gains.derivative_time_s / tick_s
 
     def with_serial(self, **changes: int | bool | None) -> Self:
-        """Return this table with other serial settings; a setting that is None stays as it is.
+        """Return this table with other serial settings. A setting that is None is not changed.
 
         Raises:
-            ConfigError: A setting is outside its range.
+            ConfigError: a setting is outside its range.
         """
         chosen = {key: value for key, value in changes.items() if value is not None}
         given = TomlTable("serial settings", chosen, "serial.", ConfigError)
@@ -209,10 +209,10 @@ class TableConfig:
 
 
 def load_config(path: str | Path | None = None) -> TableConfig:
-    """Read a table's constants: the shipped defaults, with those of the file at `path` over them.
+    """Read a table's constants: the default values, with those of the file at `path` in their place.
 
     Raises:
-        ConfigError: The file cannot be read, or a key, a type, a range or a combination is wrong.
+        ConfigError: the file cannot be read, or a key, a type, a range or a combination is wrong.
     """
     default = TomlTable(DEFAULT_FILE.name, {}, error=ConfigError)
     top = default if path is None else TomlTable.load(Path(path), ConfigError)
@@ -240,24 +240,24 @@ def _check_together(config: TableConfig, source: str) -> None:
 
 
 def _check_turn(config: TableConfig, source: str) -> None:
-    """Refuse a turn that is not a fraction of two integers of 32 bits, in counts."""
+    """Refuse a turn that is not a fraction of two 32-bit integers, in counts."""
     lines, counts = config.encoder.lines, config.counts_per_turn
     if counts > INT32_MAX:
         raise ConfigError(
-            f"{source}: a turn is {float(counts):.3g} counts; it must be at most {INT32_MAX}: "
-            "lower encoder.lines or gears.ratio"
+            f"{source}: a turn is {float(counts):.3g} counts; it must be at most {INT32_MAX}; "
+            "reduce encoder.lines or gears.ratio"
         )
     if max(counts.numerator, counts.denominator) > INT32_MAX:
         most = INT32_MAX // (4 * lines * ceil(config.gears.ratio))
         nearest = simplest_fraction(config.gears.ratio).limit_denominator(max(1, most))
         raise ConfigError(
             f"{source}: gears.ratio is {config.gears.ratio!r}; with encoder.lines {lines} a turn is {counts} counts, "
-            f'a fraction of more than 32 bits; the nearest ratio that fits is "{nearest}"'
+            f'a fraction of more than 32 bits; the nearest allowed ratio is "{nearest}"'
         )
 
 
 def _check_registers(config: TableConfig, source: str) -> None:
-    """Refuse what does not fit the firmware's number formats; see `fixed_point`."""
+    """Refuse values that do not fit the firmware's number formats; see `fixed_point`."""
     count_deg, tick_hz, window = config.counts_per_deg, config.control.tick_hz, config.control.speed_window_ticks
     unit, most_counts = 2.0**-config.motion_bits, float(ERROR_MAX >> ERROR_BITS)
     speeds_deg_s = (unit * tick_hz / count_deg, most_counts / window * tick_hz / count_deg)

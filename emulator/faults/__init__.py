@@ -1,4 +1,4 @@
-"""What can go wrong with a table, and when."""
+"""The faults of a table, and their schedule."""
 
 from emulator.faults.fault import FaultError, fault_from
 from protocol.bench import Fault

@@ -1,7 +1,7 @@
-"""The faults that can be injected into a table: by name, and the numbers that each takes.
+"""The faults that can be injected into a table, with their names and their numbers.
 
-The same names and numbers are used in a configuration file, on the control channel and by `Table.inject`. When a fault
-holds is in `schedule`; what it does is in `line_faults`, `drive_faults` and `trigger_faults`.
+The configuration file, the control channel and `Table.inject` use the same names and numbers. `schedule` defines when a
+fault is active. `line_faults`, `drive_faults` and `trigger_faults` define its effect.
 """
 
 from collections.abc import Mapping
@@ -14,13 +14,13 @@ from protocol.data_file import shown
 
 
 class FaultError(ValueError):
-    """A fault that cannot be; the message states what is allowed."""
+    """A fault that cannot be injected. The message states what is allowed."""
 
 
 ByteProbability = Annotated[float, 0.0, 1.0, "probability of each byte"]
 EdgeProbability = Annotated[float, 0.0, 1.0, "probability of each edge"]
 Delay = Annotated[float, 0.0, 3600.0, "delay in s"]
-LineDirection = Annotated[int, -1, 1, "1: towards the table, -1: towards the client, 0 (default): both"]
+LineDirection = Annotated[int, -1, 1, "1: to the table, -1: to the client, 0 (default): both"]
 
 
 class Drop(Fault, kind="drop"):
@@ -56,7 +56,7 @@ class LateReply(Fault, kind="late-reply"):
 
 
 class Silence(Fault, kind="silence"):
-    """Commands are carried out, and no reply is sent."""
+    """Commands are executed without a reply."""
 
 
 class HangUp(Fault, kind="hang-up"):
@@ -74,7 +74,7 @@ class Stall(Fault, kind="stall"):
 
 
 class ExtraLoad(Fault, kind="extra-load"):
-    """A torque loads the table."""
+    """A torque acts on the table."""
 
     torque_Nm: Annotated[float, -1000.0, 1000.0, "at its axis; positive resists forward rotation"]
 
@@ -125,7 +125,7 @@ class BouncedTrigger(Fault, kind="bounced-trigger"):
 
 
 STRIKES_ONCE = (HalfReply, LateReply)
-"""These strike at the next occasion, and are over."""
+"""These act once, at the next opportunity, and then end."""
 
 KINDS: Mapping[str, type[Fault]] = {
     kind.kind: kind
@@ -138,13 +138,13 @@ KINDS: Mapping[str, type[Fault]] = {
 
 
 def help_of(kind: str) -> str:
-    """Return what a fault does, as half a sentence."""
+    """Return the effect of a fault as a phrase."""
     sentence = KINDS[kind].__doc__ or kind
     return sentence[0].lower() + sentence[1:].rstrip(".")
 
 
 def parameters_of(kind: str) -> tuple[Parameter, ...]:
-    """Return all that a fault takes: its own numbers, and its schedule; one that strikes once has no duration."""
+    """Return all parameters of a fault: its own numbers, and its schedule. A fault that acts once has no duration."""
     own: list[Parameter] = []
     schedule: list[Parameter] = []
     defaults = {each.name: each.default for each in fields(KINDS[kind])}
@@ -159,10 +159,11 @@ def parameters_of(kind: str) -> tuple[Parameter, ...]:
 
 
 def fault_from(kind: object, given: Mapping[str, object]) -> Fault:
-    """Return the fault of a name and its numbers.
+    """Return the fault with a name and its numbers.
 
     Raises:
-        FaultError: the fault is unknown, a number is missing, unknown or out of range, or two beginnings are given.
+        FaultError: the fault is unknown, a number is missing, unknown or out of range, or two start conditions are
+            given.
     """
     if not isinstance(kind, str) or kind not in KINDS:
         raise FaultError(f"{shown(kind)} is not a fault; there are {', '.join(KINDS)}")
@@ -181,7 +182,7 @@ def _check_numbers(kind: str, given: Mapping[str, object]) -> None:
     unknown = sorted(set(given) - {parameter.name for parameter in parameters})
     if unknown:
         names = ", ".join(parameter.name for parameter in parameters)
-        raise FaultError(f"{kind}: {unknown[0][:60]} is not known; it takes {names}")
+        raise FaultError(f"{kind}: {unknown[0][:60]} is not a parameter; allowed are {names}")
     for parameter in parameters:
         if parameter.name not in given and not parameter.optional:
             raise FaultError(f"{kind}: {parameter.name} is missing; it must be {parameter.allowed}")
@@ -190,4 +191,4 @@ def _check_numbers(kind: str, given: Mapping[str, object]) -> None:
                 f"{kind}: {parameter.name} is {shown(given[parameter.name])}; it must be {parameter.allowed}"
             )
     if "at_s" in given and "at_command" in given:
-        raise FaultError(f"{kind}: at_s and at_command are two beginnings; give one of them")
+        raise FaultError(f"{kind}: at_s and at_command are both given; give only one start condition")

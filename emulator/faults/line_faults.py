@@ -1,4 +1,4 @@
-"""What faults do to the serial line: to the bytes on their way, and to the replies before they are sent."""
+"""The effect of faults on the serial line: on bytes in transmission, and on replies before they are sent."""
 
 from collections import deque
 
@@ -8,34 +8,34 @@ from emulator.line.framing import read_at_rate
 from protocol.bench import Fault
 
 LINE_KINDS: frozenset[type[Fault]] = frozenset((Drop, Flip, LateReplies, HalfReply, LateReply, Silence, WrongBaud))
-"""The faults that this module gives their effect."""
+"""The faults that this module implements."""
 
 TO_TABLE, TO_CLIENT = 1, -1
-"""The direction of bytes, as a fault's parameter `direction` names it; there 0 is both."""
+"""The direction of bytes, as in a fault's parameter `direction`; there 0 means both."""
 
 
 class LineFaults:
-    """Loses, changes and holds back what passes the line, as the faults that hold want it."""
+    """Drops, changes and delays bytes, as the active faults require."""
 
     def __init__(self, baud: int, tick_hz: int, faults: FaultSchedule) -> None:
-        """Start with nothing held back, on a line of a baud rate (0: not paced) and for a firmware's clock."""
+        """Start without delayed bytes, on a line of a baud rate (0: not paced) and for a firmware's clock."""
         self._faults = faults
         self._baud = baud
         self._tick_hz = tick_hz
-        self._held: deque[tuple[int, bytes]] = deque()  # each with the tick at which it goes on
+        self._held: deque[tuple[int, bytes]] = deque()  # each with the tick at which it is sent
 
     @property
     def are_present(self) -> bool:
-        """Whether any fault holds or is to come."""
+        """Whether a fault is active or scheduled."""
         return self._faults.present
 
     @property
     def held_until(self) -> int | None:
-        """The tick at which replies that are held back go on; None where there are none."""
+        """The tick at which delayed replies are sent; None if there are none."""
         return self._held[0][0] if self._held else None
 
     def on_the_line(self, data: bytes, direction: int) -> bytes:
-        """Return what becomes of bytes on their way to the table or to the client."""
+        """Return the bytes that arrive at the table or at the client, after the effect of the faults."""
         faults = self._faults
         if not faults.present:
             return data
@@ -51,7 +51,7 @@ class LineFaults:
         return data
 
     def on_a_reply(self, reply: bytes, tick: int) -> bytes:
-        """Return what the table sends of a reply now; the rest is lost, or held back."""
+        """Return the part of a reply that the table sends now. The rest is lost or delayed."""
         faults = self._faults
         if not (faults.present or self._held):
             return reply
@@ -68,14 +68,14 @@ class LineFaults:
         return b""
 
     def released(self, tick: int) -> bytes:
-        """Return the replies whose time has come."""
+        """Return the replies that are due."""
         data = b""
         while self._held and self._held[0][0] <= tick:
             data += self._held.popleft()[1]
         return data
 
     def disconnect(self) -> None:
-        """Forget what is held back: the client has gone."""
+        """Discard the delayed replies: the client has disconnected."""
         self._held.clear()
 
     def _flipped(self, byte: int, probability: float) -> int:

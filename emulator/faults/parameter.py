@@ -1,10 +1,10 @@
-"""A number that a command of the control channel, or a fault, takes."""
+"""A number that a control command or a fault takes."""
 
 from typing import NamedTuple
 
 
 class Parameter(NamedTuple):
-    """A number, and the closed interval that it must lie in; `optional`: it may be left out; `whole`: no fraction."""
+    """A number, and its allowed closed interval. `optional`: it may be omitted; `whole`: it has no fraction."""
 
     name: str
     least: float
@@ -15,13 +15,13 @@ class Parameter(NamedTuple):
 
     @property
     def allowed(self) -> str:
-        """What it may be, in words."""
+        """The allowed values, as text."""
         if self.whole:
             return f"a whole number from {self.least:.0f} to {self.most:.0f}"
         return f"a number from {self.least:g} to {self.most:g}"
 
     def accepts(self, value: object) -> bool:
-        """Return whether a value from outside is such a number."""
+        """Return whether an external value is an allowed number."""
         if not isinstance(value, int | float) or isinstance(value, bool) or not self.least <= value <= self.most:
             return False
         return not self.whole or value == int(value)

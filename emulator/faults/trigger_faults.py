@@ -1,4 +1,4 @@
-"""What faults do to the edges on the trigger input."""
+"""The effect of faults on the edges at the trigger input."""
 
 import math
 
@@ -7,25 +7,25 @@ from emulator.faults.schedule import FaultSchedule
 from protocol.bench import Fault
 
 TRIGGER_KINDS: frozenset[type[Fault]] = frozenset((MissedTrigger, BouncedTrigger))
-"""The faults that this module gives their effect."""
+"""The faults that this module implements."""
 
 
 class TriggerFaults:
-    """Hides edges, and lets others follow them, as the faults that hold want it."""
+    """Removes and adds edges, as the active faults require."""
 
     def __init__(self, tick_hz: int, faults: FaultSchedule) -> None:
-        """Start with an input that does not bounce."""
+        """Start with an input without bounce."""
         self._faults = faults
         self._tick_hz = tick_hz
         self._bounce_end_tick = 0
 
     def misses_edge(self) -> bool:
-        """Return whether this edge is not seen."""
+        """Return whether the controller misses this edge."""
         fault = self._faults.holding(MissedTrigger)
         return fault is not None and self._faults.strikes(fault.probability)
 
     def bounces(self, tick: int) -> list[tuple[int, float]]:
-        """Return the edges that follow one in this tick, each a tick and a fraction; they do not bounce themselves."""
+        """Return the additional edges of this tick after an edge, each a tick and a fraction. They do not bounce."""
         fault = self._faults.holding(BouncedTrigger)
         if fault is None or tick < self._bounce_end_tick:
             return []

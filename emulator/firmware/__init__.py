@@ -1,1 +1,1 @@
-"""The controller's program: fixed-point numbers, profiler, PID, and what they do at each tick."""
+"""The firmware of the controller: fixed-point numbers, profiler, PID, and their work in each tick."""

@@ -1,6 +1,6 @@
-"""The controller's tick: profiler, speed estimate, PID, and the protection of the motor.
+"""One tick of the controller: profiler, speed estimate, PID, and motor protection.
 
-A motion runs through these states:
+A motion has these states:
 
     IDLE     the drive is off; friction holds the table
     MOVING   the profile runs, the PID follows its speed
@@ -27,35 +27,35 @@ STATE_NAMES = ("idle", "moving", "settling", "stalled")
 
 
 class Firmware(NamedTuple):
-    """The controller's constants, in its own formats."""
+    """The controller's constants, in its own number formats."""
 
     pid: Pid
     motion_bits: int  # fraction bits of position, speed and acceleration
-    window_ticks: int  # over which the speed is measured
-    arrival_count: int  # this near is at the target
-    arrival_ticks: int  # once it has been there for so long
+    window_ticks: int  # interval of the speed measurement
+    arrival_count: int  # within this distance the table is at the target
+    arrival_ticks: int  # time at the target until the motion ends
     approach_rate: int  # of speed over remaining distance, per tick; `motion_bits`
     approach_speed: int  # count/tick, `motion_bits`
-    stall_duty: int  # PWM steps; a motor driven so hard must turn
-    stall_ticks: int  # within this time
-    settling_ticks: int  # the longest that settling may take
+    stall_duty: int  # PWM steps; above this duty a healthy motor turns
+    stall_ticks: int  # maximum time without motion
+    settling_ticks: int  # maximum settling time
 
 
 class FirmwareState(NamedTuple):
-    """The controller's memory."""
+    """The controller's state."""
 
     motion: int  # IDLE, MOVING, SETTLING or STALLED
     profile: Profile
     reference: Reference
-    counts: tuple[int, ...]  # of the last ticks, oldest first, as many as the speed window
+    counts: tuple[int, ...]  # of the last ticks, oldest first; the length is the speed window
     pid: PidState
-    still_ticks: int  # driven hard without a change of the count
-    settling_ticks: int  # since the profile ended
-    arrived_ticks: int  # within the arrival window without a break
+    still_ticks: int  # ticks at high duty without a change of the count
+    settling_ticks: int  # ticks since the end of the profile
+    arrived_ticks: int  # ticks within the arrival window without a break
 
 
 def power_on(parameters: Firmware, profile: Profile, count: int) -> FirmwareState:
-    """Return the controller as it wakes: at rest where the encoder stands."""
+    """Return the controller at power-on: at rest at the encoder's position."""
     return FirmwareState(
         motion=IDLE,
         profile=profile,
@@ -71,13 +71,13 @@ def power_on(parameters: Firmware, profile: Profile, count: int) -> FirmwareStat
 def begin_motion(state: FirmwareState, profile: Profile, distance: int, bits: int) -> FirmwareState:
     """Return the controller with a new target, `distance` (`bits` fraction bits) from the reference.
 
-    The reference goes on from its present position and speed; that of a table that stalled is where it stands.
+    The reference continues from its present position and speed. For a stalled table, it starts at the present count.
     """
     return FirmwareState(MOVING, profile, retarget(state.reference, distance, bits), state.counts, state.pid, 0, 0, 0)
 
 
 def distance_to(reference: Reference, target: int, bits: int) -> int:
-    """Return the way to an absolute position; both with `bits` fraction bits, neither modulo a turn."""
+    """Return the distance to an absolute position; both with `bits` fraction bits, neither modulo a turn."""
     return target - (reference.position_count << bits) - reference.fraction
 
 
@@ -122,5 +122,5 @@ def _drive_off(
 
 
 def position_error(reference: Reference, count: int, bits: int) -> int:
-    """Return how far the encoder is from the reference position, in whole counts."""
+    """Return the distance of the encoder from the reference position, in whole counts."""
     return wrap_int32(reference.position_count + (reference.fraction >> (bits - 1)) - count)

@@ -1,7 +1,7 @@
 """The firmware's number formats: integers with a stated number of fraction bits.
 
-Each quantity fits a 32-bit register; a product of two, and a distance with its fraction, fit 64 bits. Shifts to the
-right round towards minus infinity, as an arithmetic shift does on the controller.
+Each quantity fits a 32-bit register. A product of two, and a distance with its fraction, fit 64 bits. A right shift
+rounds toward minus infinity, as an arithmetic shift on the controller does.
 
 | quantity | unit | fraction bits | register |
 |---|---|---|---|
@@ -27,19 +27,19 @@ INTEGRAL_GAIN_BITS = 16
 OUTPUT_BITS = ERROR_BITS + GAIN_BITS
 
 ERROR_MAX = (1 << 29) - 1
-"""Four products of it with a gain fit 64 bits."""
+"""Four products of this number with a gain fit 64 bits."""
 
 FEWEST_MOTION_BITS = 9
 MOST_MOTION_BITS = 30
-"""With more, an absolute target at the far end of the counter would be further away than 64 bits hold."""
+"""With more bits, an absolute target at the far end of the counter would be too far away for 64 bits."""
 
 
 def motion_bits(speed: Fraction, acceleration: Fraction) -> int:
-    """Return as many fraction bits as the sum of the greatest speed and acceleration leaves in 32 bits, within limits.
+    """Return the number of fraction bits, within limits, for which speed plus acceleration fits 32 bits.
 
     Args:
-        speed: the greatest, count/tick.
-        acceleration: the greatest, count/tick^2.
+        speed: maximum, count/tick.
+        acceleration: maximum, count/tick^2.
     """
     bits = MOST_MOTION_BITS
     while bits > FEWEST_MOTION_BITS and to_fixed(speed, bits) + to_fixed(acceleration, bits) > INT32_MAX:
@@ -48,7 +48,7 @@ def motion_bits(speed: Fraction, acceleration: Fraction) -> int:
 
 
 def clamp(number: int, bound: int) -> int:
-    """Return `number`, or what is nearest to it within -bound..bound."""
+    """Return `number` limited to -bound..bound."""
     if number > bound:
         return bound
     if number < -bound:
@@ -57,15 +57,15 @@ def clamp(number: int, bound: int) -> int:
 
 
 def to_fixed(value: Fraction | float, fraction_bits: int) -> int:
-    """Return the integer nearest to `value` with that many fraction bits; halves go to the even one."""
+    """Return the nearest integer to `value` with the given number of fraction bits; halves are rounded to even."""
     return round(Fraction(value) * (1 << fraction_bits))
 
 
 def gain_registers(proportional: float, integral: float, derivative: float) -> tuple[int, int, int]:
-    """Return a gain set, in the units of the table above, as the firmware's registers hold it.
+    """Return a gain set, in the units of the table above, as integers in the firmware's registers.
 
     Raises:
-        OverflowError: A gain does not fit its register, or the integral gain rounds to nothing.
+        OverflowError: a gain does not fit its register, or the integral gain rounds to 0.
     """
     registers = (
         to_fixed(proportional, GAIN_BITS),
@@ -81,5 +81,5 @@ def gain_registers(proportional: float, integral: float, derivative: float) -> t
 
 
 def from_fixed(number: int, fraction_bits: int) -> float:
-    """Return the value of an integer with that many fraction bits."""
+    """Return the value of an integer with the given number of fraction bits."""
     return number / (1 << fraction_bits)

@@ -1,9 +1,9 @@
 """The trapezoidal velocity profiler: the reference position and speed of the PID loop (Fig. 3 of the paper).
 
-The profile is not planned ahead. At each tick the reference takes the greatest speed that the acceleration, the top
-speed and the distance left to brake allow, so a new target, speed or acceleration may come at any time: the reference
-goes on from where it is, at the speed that it has (Fig. 4). All numbers are integers; `bits` are
-their fraction bits, see `fixed_point`.
+The profile is not planned in advance. At each tick the reference takes the maximum speed that the acceleration, the
+maximum speed and the remaining braking distance allow. So a new target, speed or acceleration may come at any time: the
+reference continues from its present position and speed (Fig. 4). All numbers are integers with `bits` fraction bits,
+see `fixed_point`.
 """
 
 from typing import NamedTuple
@@ -12,9 +12,9 @@ from emulator.int32 import wrap_int32
 
 
 class Profile(NamedTuple):
-    """What one motion must keep."""
+    """The limits of one motion."""
 
-    speed: int  # the greatest, count/tick
+    speed: int  # maximum, count/tick
     acceleration: int  # count/tick^2
     far: int  # count; see `far_distance`
 
@@ -25,12 +25,15 @@ class Profile(NamedTuple):
 
 
 def far_distance(acceleration: int) -> int:
-    """Return a distance from which any speed can be braked; up to it, `step` stays within 64 bits."""
+    """Return a distance that is sufficient for braking from any speed. Up to it, `step` stays within 64 bits."""
     return (1 << 61) // acceleration
 
 
 class Reference(NamedTuple):
-    """Where the profile is, and its way to the target; both are a word of whole counts and a word of the fraction."""
+    """The state of the profile, and the distance to its target.
+
+    Each has a word of whole counts and a word of the fraction.
+    """
 
     position_count: int
     fraction: int
@@ -40,17 +43,17 @@ class Reference(NamedTuple):
 
 
 def standing_at(count: int) -> Reference:
-    """Return the reference of a table that stands at a count and has nowhere to go."""
+    """Return the reference of a table that stands at a count without a motion."""
     return Reference(count, 0, 0, 0, 0)
 
 
 def at_rest(reference: Reference) -> bool:
-    """Tell whether the profile has reached its target and stands."""
+    """Return whether the profile has reached its target and stands."""
     return reference.speed == 0 and reference.distance_count == 0 and reference.distance_fraction == 0
 
 
 def retarget(reference: Reference, distance: int, bits: int) -> Reference:
-    """Return the reference with a new target, `distance` away; position and speed go on."""
+    """Return the reference with a new target at `distance`. Position and speed continue."""
     return Reference(
         reference.position_count,
         reference.fraction,
@@ -82,10 +85,10 @@ def step(profile: Profile, reference: Reference, bits: int) -> Reference:
 
 
 def _towards(profile: Profile, speed: int, distance: int) -> tuple[int, int]:
-    """Return the next speed, and the way made until then, for a target ahead (`distance` >= 0).
+    """Return the next speed, and the travel until then, for a target ahead (`distance` >= 0).
 
-    From the next speed v' the table brakes at a over v'^2 / 2a. It stops in time when
-    (v + v') / 2 + v'^2 / 2a <= distance, that is v'^2 + a (v + v') <= 2 a distance.
+    From the next speed v', the braking distance at a is v'^2 / 2a. The table stops in time if (v + v') / 2 + v'^2 / 2a
+    <= distance, that is v'^2 + a (v + v') <= 2 a distance.
     """
     top_speed, acceleration, far = profile
     slowest, fastest = speed - acceleration, speed + acceleration
@@ -94,7 +97,7 @@ def _towards(profile: Profile, speed: int, distance: int) -> tuple[int, int]:
     elif fastest > top_speed:
         fastest = top_speed
     if 0 <= speed <= acceleration and (2 * distance < speed or distance <= (acceleration >> 2) + 2):
-        return 0, distance  # the rest of the way is shorter than a tick
+        return 0, distance  # the rest of the travel is shorter than a tick
     if fastest > 0 and distance < far:
         room = 2 * acceleration * distance - acceleration * speed
         if fastest * (fastest + acceleration) > room:
@@ -103,9 +106,9 @@ def _towards(profile: Profile, speed: int, distance: int) -> tuple[int, int]:
 
 
 def _greatest_root(acceleration: int, room: int, above: int) -> int:
-    """Return the greatest whole v >= 0 with v (v + a) <= room, or 0; `above` is not less than it.
+    """Return the largest integer v >= 0 with v (v + a) <= room, or 0; `above` is not less than v.
 
-    Newton's method from above, on a convex function: it falls until it is there, mostly within three rounds.
+    Newton's method from above on a convex function: it decreases to the solution, mostly within three iterations.
     """
     if room <= 0:
         return 0

@@ -1,1 +1,1 @@
-"""The serial line: frames of bits, and the bytes on their way."""
+"""The serial line: frames of bits, and bytes in transmission."""

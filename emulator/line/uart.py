@@ -1,32 +1,36 @@
-"""The serial line at the controller: bytes paced at the baud rate both ways, and a small receive buffer.
+"""The serial line at the controller: bytes paced at the baud rate in both directions, and a small receive buffer.
 
-Time is counted in integers: a tick brings `baud` units, a byte (start, 8 data and stop bit) takes ten times `tick_hz`.
+Time is counted in integers: a tick adds `baud` units, and a byte (start, 8 data and stop bits) takes ten times
+`tick_hz`.
 """
 
 from collections import deque
 from typing import Final
 
 RECEIVE_LIMIT = 64
-"""Bytes that wait for the firmware; what comes when it is full is lost, as on a small controller."""
+"""Maximum number of bytes that wait for the firmware.
+
+When the buffer is full, bytes are lost, as on a small controller.
+"""
 
 TRANSMIT_LIMIT = 64
-"""Bytes that wait for the line; the firmware reads no further line while a reply might not fit."""
+"""Maximum number of bytes that wait for the line. The firmware reads no further line while a reply might not fit."""
 
 LOST: Final = None
-"""Stands in the receive buffer where bytes were lost."""
+"""Marks lost bytes in the receive buffer."""
 
 
 class Wire:
-    """One direction of the line, on which bytes follow each other without a gap."""
+    """One direction of the line. Its bytes follow each other without a gap."""
 
     def __init__(self, baud: int, tick_hz: int) -> None:
         self.queue: deque[int] = deque()
         self._tick_units = baud
         self._byte_units = 10 * tick_hz
-        self._units = 0  # of the first byte that have passed
+        self._units = 0  # elapsed units of the first byte
 
     def advance(self) -> list[int]:
-        """Return the bytes that are over when a tick has passed."""
+        """Return the bytes that are complete after a tick."""
         over = []
         if self.queue:
             self._units += self._tick_units
@@ -38,15 +42,15 @@ class Wire:
         return over
 
     def ticks_until_byte(self) -> int:
-        """Return the ticks until the first byte is over; only while there is one."""
+        """Return the ticks until the first byte is complete; only while there is one."""
         return max(1, -(-(self._byte_units - self._units) // self._tick_units))
 
     def ticks_until(self, index: int) -> int:
-        """Return the ticks until the byte at an index of the queue is over."""
+        """Return the ticks until the byte at an index of the queue is complete."""
         return max(1, -(-((index + 1) * self._byte_units - self._units) // self._tick_units))
 
     def advance_by(self, ticks: int) -> list[int]:
-        """Return the bytes that are over when ticks have passed, as so many calls of `advance` do."""
+        """Return the bytes that are complete after some ticks, as the same number of calls of `advance` would."""
         over: list[int] = []
         if self.queue:
             self._units += ticks * self._tick_units
@@ -55,13 +59,13 @@ class Wire:
         return over
 
     def clear(self) -> None:
-        """Forget what is on the line."""
+        """Discard the bytes on the line."""
         self.queue.clear()
         self._units = 0
 
 
 class Uart:
-    """Both directions of a paced line. A baud rate of 0 is not its business: then there is no line to wait for."""
+    """Both directions of a paced line. A baud rate of 0 is not handled here: such a line needs no wait."""
 
     def __init__(self, baud: int, tick_hz: int) -> None:
         """Start with an idle line."""
@@ -69,46 +73,46 @@ class Uart:
         self._outgoing = Wire(baud, tick_hz)
         self._received: deque[int | None] = deque()
         self._sent = bytearray()
-        self._never_overruns = baud <= RECEIVE_LIMIT * 10 * tick_hz  # bytes within a tick
+        self._never_overruns = baud <= RECEIVE_LIMIT * 10 * tick_hz  # bytes per tick
         self.lost_bytes = 0
 
     @property
     def idle(self) -> bool:
-        """Whether nothing is on the line or waiting for the firmware."""
+        """Whether no byte is on the line or waiting for the firmware."""
         return not (self._incoming.queue or self._outgoing.queue or self._received)
 
     @property
     def waiting_count(self) -> int:
-        """Bytes on their way to the firmware."""
+        """Bytes in transmission to the firmware."""
         return len(self._incoming.queue) + len(self._received)
 
     @property
     def transmit_count(self) -> int:
-        """Bytes that the firmware has written and the line has not yet carried."""
+        """Bytes that the firmware has written and the line has not yet transmitted."""
         return len(self._outgoing.queue)
 
     @property
     def transmit_room(self) -> int:
-        """Bytes that the firmware may still write."""
+        """Number of bytes that the firmware may still write."""
         return TRANSMIT_LIMIT - len(self._outgoing.queue)
 
     def receive(self, data: bytes) -> None:
-        """Take bytes that the client puts on the line now."""
+        """Take bytes that the client sends now."""
         self._incoming.queue.extend(data)
 
     def transmit(self) -> bytes:
-        """Return the bytes whose stop bit has left, and forget them."""
+        """Return and remove the bytes whose stop bit has been sent."""
         sent = bytes(self._sent)
         self._sent.clear()
         return sent
 
     def read(self) -> int | None:
-        """Return the firmware's next byte, or `LOST`; only while `readable`."""
+        """Return the next byte for the firmware, or `LOST`; only while `readable`."""
         return self._received.popleft()
 
     @property
     def readable(self) -> bool:
-        """Whether the receive buffer holds something."""
+        """Whether the receive buffer contains a byte."""
         return bool(self._received)
 
     def write(self, data: bytes) -> None:
@@ -116,44 +120,44 @@ class Uart:
         self._outgoing.queue.extend(data)
 
     def advance(self) -> None:
-        """Let one tick pass on the line."""
+        """Advance the line by one tick."""
         for byte in self._incoming.advance():
             self._store(byte)
         self._sent += bytes(self._outgoing.advance())
 
     def ticks_until_byte(self) -> int | None:
-        """Return the ticks until the next byte is over, in either direction; None on an idle line."""
+        """Return the ticks until the next byte is complete, in either direction; None on an idle line."""
         busy = (wire for wire in (self._incoming, self._outgoing) if wire.queue)
         return min((wire.ticks_until_byte() for wire in busy), default=None)
 
     @property
     def is_read_at_once(self) -> bool:
-        """Whether the firmware, as long as it has room to write, reads each byte in the tick in which it is over."""
+        """Whether the firmware reads each byte in the tick in which it is complete, as long as it has room to write."""
         return self._never_overruns and not self._received
 
     @property
     def outgoing(self) -> bytes:
-        """The bytes that have not left yet, the first one that on the line."""
+        """The bytes that have not been sent yet, starting with the one on the line."""
         return bytes(self._outgoing.queue)
 
     def ticks_until_received(self, byte: int | None = None) -> int | None:
-        """Return the ticks until a byte has come in, or else all bytes; None where it is not on the line."""
+        """Return the ticks until a byte has been received, or else all bytes; None if it is not on the line."""
         queue = self._incoming.queue
         if not queue or (byte is not None and byte not in queue):
             return None
         return self._incoming.ticks_until(len(queue) - 1 if byte is None else queue.index(byte))
 
     def ticks_until_sent(self, count: int) -> int:
-        """Return the ticks until so many bytes have left; there are as many."""
+        """Return the ticks until the given number of bytes has been sent; so many are queued."""
         return self._outgoing.ticks_until(count - 1)
 
     def advance_by(self, ticks: int) -> bytes:
-        """Let ticks pass on a line that `is_read_at_once`, and return the bytes that have come in: the firmware's."""
+        """Advance a line that `is_read_at_once` by some ticks, and return the bytes received by the firmware."""
         self._sent += bytes(self._outgoing.advance_by(ticks))
         return bytes(self._incoming.advance_by(ticks))
 
     def disconnect(self) -> None:
-        """Forget what is on the line: the client has gone."""
+        """Discard all bytes: the client has disconnected."""
         self._incoming.clear()
         self._outgoing.clear()
         self._received.clear()

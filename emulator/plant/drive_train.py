@@ -1,12 +1,12 @@
-"""Motor, gears with backlash, and table: the plant between the PWM voltage and the true angle of the table.
+"""Motor, gears with backlash, and table: the plant from the PWM voltage to the true angle of the table.
 
-The teeth of the chain are either in contact, on the flank that drives the table forwards (`contact` = 1) or backwards
-(-1), and motor and table turn as one; or the motor runs free within the backlash (0), and the table coasts. A tick is
-taken in one of these states. Contact ends when the table would have to pull on the flank; when the gap closes, the two
-speeds meet without rebound.
+The teeth of the chain may be in contact, on the flank that drives the table forward (`contact` = 1) or backward (-1).
+Then motor and table turn as one. Otherwise (0) the motor runs free within the backlash, and the table coasts. Each tick
+is computed in one of these states. Contact ends when the table would have to pull on the flank. When the gap closes,
+the two bodies continue with a common speed, without rebound.
 
-The gears' efficiency acts on the torque through the teeth: a table that is driven weighs 1/efficiency of its torque on
-the motor, one that drives the motor only its efficiency.
+The gears' efficiency acts on the torque through the teeth. A driven table loads the motor with 1/efficiency of its
+torque. A driving table loads it with the efficiency times its torque.
 """
 
 import math
@@ -17,7 +17,7 @@ from emulator.plant.motor import Motor, MotorStep, discretize
 
 
 class Gears(NamedTuple):
-    """The gear chain between motor and table."""
+    """The gears between motor and table."""
 
     ratio: float
     efficiency: float
@@ -26,7 +26,7 @@ class Gears(NamedTuple):
 
 
 class Coupling(NamedTuple):
-    """Motor and table in contact, for one direction of the power through the teeth."""
+    """Motor and table in contact, for one direction of the power flow through the teeth."""
 
     motor: MotorStep
     torque_ratio: float  # torque at the motor for a torque at the table
@@ -42,7 +42,7 @@ class DriveTrain(NamedTuple):
     friction: Friction
     torque_constant_Nm_A: float
     resistance_ohm: float
-    current_decay: float  # of a motor that stands, per tick
+    current_decay: float  # of a motor at rest, per tick
     motor_inertia_kg_m2: float  # with the gears
     table_inertia_kg_m2: float
     bearing_friction_Nm: float
@@ -50,7 +50,7 @@ class DriveTrain(NamedTuple):
     table_per_motor: float  # the reciprocal of the ratio
     half_gap_rad: float  # at the table
     tick_s: float
-    inertial_torque_Nm_s: float  # at the table, for each rad/s by which the motor's speed changes within a tick
+    inertial_torque_Nm_s: float  # at the table, for each rad/s of change of the motor's speed within a tick
 
     @classmethod
     def of(
@@ -63,7 +63,7 @@ class DriveTrain(NamedTuple):
         bearing_friction_Nm: float,
         tick_s: float,
     ) -> "DriveTrain":
-        """Return the plant of these parts; `friction` is that of motor and gears at the motor's shaft."""
+        """Return the plant of these parts; `friction` is the friction of motor and gears at the motor's shaft."""
         motor_inertia = motor.rotor_inertia_kg_m2 + gears.inertia_kg_m2
 
         def coupling(torque_ratio: float) -> Coupling:
@@ -90,24 +90,24 @@ class DriveTrain(NamedTuple):
 
 
 class DriveState(NamedTuple):
-    """Where the plant is. Angles are unwrapped."""
+    """The state of the plant. Angles are unwrapped."""
 
     current_A: float
     speed_rad_s: float  # of the motor
     angle_rad: float  # of the motor
     table_speed_rad_s: float
     table_angle_rad: float
-    contact: int  # 1 or -1: on the flank that drives forwards or backwards; 0: within the gap
+    contact: int  # 1 or -1: on the flank that drives forward or backward; 0: within the gap
 
 
 def at_standstill(train: DriveTrain, gap_share: float) -> DriveState:
-    """Return a plant at rest whose teeth stand at `gap_share` (-1..1) of the way from mid-gap to a flank."""
+    """Return a plant at rest. `gap_share` (-1..1) is the position of the teeth from mid-gap to a flank."""
     contact = 1 if train.half_gap_rad == 0.0 else 0
     return DriveState(0.0, 0.0, 0.0, 0.0, -gap_share * train.half_gap_rad, contact)
 
 
 def step(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
-    """Return the plant one tick later; the load torque at the table resists positive rotation."""
+    """Return the plant one tick later. The load torque at the table opposes positive rotation."""
     if state.contact == 0:
         return _free(train, state, voltage_V, load_torque_Nm)
     if state.speed_rad_s == 0.0:
@@ -116,7 +116,7 @@ def step(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm:
 
 
 def _turning(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
-    """In contact and moving. Friction keeps the value that it has at the start of the tick."""
+    """In contact and moving. The friction is constant within the tick and has its initial value."""
     speed, contact = state.speed_rad_s, state.contact
     direction = 1 if speed > 0.0 else -1
     rigid = train.half_gap_rad == 0.0
@@ -141,7 +141,7 @@ def _turning(train: DriveTrain, state: DriveState, voltage_V: float, load_torque
 
 
 def _standing(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
-    """In contact and at rest: static friction holds, or the motor breaks away, or one side leaves the flank."""
+    """In contact and at rest: static friction holds, the motor breaks away, or one side leaves the flank."""
     contact, rigid = state.contact, train.half_gap_rad == 0.0
     current = _standing_current(train, state.current_A, voltage_V)
     torque = train.torque_constant_Nm_A * current
@@ -161,7 +161,7 @@ def _standing(train: DriveTrain, state: DriveState, voltage_V: float, load_torqu
 
 
 def _free(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm: float) -> DriveState:
-    """Within the gap: the motor runs alone, the table coasts, until they meet."""
+    """Within the gap: the motor runs alone and the table coasts, until they are in contact."""
     current, speed, angle = _lone_motor(train, state, voltage_V)
     table_speed, table_angle = _coasting_table(train, state, load_torque_Nm)
     gap = angle * train.table_per_motor - table_angle
@@ -178,10 +178,10 @@ def _free(train: DriveTrain, state: DriveState, voltage_V: float, load_torque_Nm
 
 
 def _speed_after_impact(train: DriveTrain, contact: int, speed: float, table_speed: float) -> float:
-    """Return the common speed of motor and table, at the motor, after they have met on a flank.
+    """Return the common speed of motor and table, at the motor, after contact on a flank.
 
-    The impulse through the teeth pays for the gears' losses on the side that it drives: on the table's while the motor
-    still turns towards the flank, from then on, if the table throws it back, on the motor's.
+    The impulse through the teeth includes the losses of the gears on the driven side. That is the table's side while
+    the motor still turns toward the flank. If the table then drives the motor back, it is the motor's side.
     """
     motor, driven, driving = train.motor_inertia_kg_m2, train.driving.inertia_kg_m2, train.overhauling.inertia_kg_m2
     if contact * speed > 0.0:
@@ -228,8 +228,8 @@ def _coasting_table(train: DriveTrain, state: DriveState, load_torque_Nm: float)
 
 
 def _motor(motor: MotorStep, state: DriveState, voltage_V: float, torque_Nm: float) -> tuple[float, float, float]:
-    """Return current, speed and angle of the motor one tick later, against a torque that resists it."""
-    ii, iw, iv, im, wi, ww, wv, wm, ai, aw, av, am = motor  # the letters of `motor`: row, then column
+    """Return current, speed and angle of the motor one tick later, against a resisting torque."""
+    ii, iw, iv, im, wi, ww, wv, wm, ai, aw, av, am = motor  # the elements of the matrix `motor`: row, then column
     current, speed = state.current_A, state.speed_rad_s
     return (
         ii * current + iw * speed + iv * voltage_V + im * torque_Nm,
@@ -239,18 +239,18 @@ def _motor(motor: MotorStep, state: DriveState, voltage_V: float, torque_Nm: flo
 
 
 def _standing_current(train: DriveTrain, current_A: float, voltage_V: float) -> float:
-    """Return the current of a motor that stands one tick later: without back-EMF only the inductance is in its way."""
+    """Return the current of a motor at rest one tick later: without back-EMF, only the inductance limits its change."""
     final = voltage_V / train.resistance_ohm
     return final + (current_A - final) * train.current_decay
 
 
 def _stopping_angle(angle_rad: float, speed_rad_s: float, next_speed_rad_s: float, tick_s: float) -> float:
-    """Return where a body stops that would have changed its direction within the tick."""
+    """Return the position at which a body stops that would have reversed its direction within the tick."""
     change = speed_rad_s - next_speed_rad_s
     return angle_rad if change == 0.0 else angle_rad + 0.5 * speed_rad_s * tick_s * speed_rad_s / change
 
 
 def _together(train: DriveTrain, current_A: float, speed_rad_s: float, angle_rad: float, contact: int) -> DriveState:
-    """Return the plant whose table turns with the motor, pressed to a flank."""
+    """Return the plant with motor and table in contact on a flank."""
     table_angle = angle_rad * train.table_per_motor - contact * train.half_gap_rad
     return DriveState(current_A, speed_rad_s, angle_rad, speed_rad_s * train.table_per_motor, table_angle, contact)

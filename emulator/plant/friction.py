@@ -1,10 +1,10 @@
-"""Friction with stiction: the Coulomb torque of a moving shaft, greater when it hardly moves (Stribeck)."""
+"""Friction with stiction: the Coulomb torque of a moving shaft, increased at low speed (Stribeck)."""
 
 from typing import NamedTuple
 
 
 class Friction(NamedTuple):
-    """Dry friction of the motor's shaft; its viscous part is in the motor's linear step."""
+    """Dry friction of the motor's shaft. Viscous friction is part of the motor's linear step."""
 
     coulomb_Nm: float
     static_Nm: float
@@ -12,7 +12,7 @@ class Friction(NamedTuple):
 
 
 def sliding_torque_Nm(friction: Friction, speed_rad_s: float) -> float:
-    """Return the torque against the motion of a shaft that turns: Coulomb's, and what is left of stiction.
+    """Return the torque against the motion of a turning shaft: Coulomb friction plus the rest of the stiction.
 
     The rational form of the Stribeck curve (Hess and Soom, 1990) needs no exponential.
     """

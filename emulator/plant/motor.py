@@ -15,7 +15,7 @@ Matrix = list[list[float]]
 
 
 class Motor(NamedTuple):
-    """The motor's own constants, as on its datasheet, with the viscous friction at its shaft."""
+    """The constants of the motor, from its datasheet, with the viscous friction at its shaft."""
 
     resistance_ohm: float
     inductance_H: float
@@ -25,7 +25,7 @@ class Motor(NamedTuple):
 
 
 class MotorStep(NamedTuple):
-    """The state one tick later: a row each for current, speed, angle; columns current, speed, voltage, torque."""
+    """The state one tick later: one row each for current, speed, angle; columns current, speed, voltage, torque."""
 
     current_current: float
     current_speed: float
@@ -42,7 +42,7 @@ class MotorStep(NamedTuple):
 
 
 def discretize(motor: Motor, inertia_kg_m2: float, tick_s: float) -> MotorStep:
-    """Return the exact step of a motor that turns the given inertia, its rotor's included, for inputs held a tick."""
+    """Return the exact step of a motor with the given inertia, including its rotor, for inputs held for a tick."""
     r, l, k, _, b = motor  # noqa: E741  # L
     j = inertia_kg_m2
     system = [  # d/dt of current, speed, angle, voltage, torque
@@ -57,9 +57,11 @@ def discretize(motor: Motor, inertia_kg_m2: float, tick_s: float) -> MotorStep:
 
 
 def matrix_exponential(matrix: Matrix) -> Matrix:
-    """Return e to a small square matrix: Taylor's series of the matrix halved until it is small, then squared back.
+    """Return the exponential of a small square matrix.
 
-    Here and not from scipy, so that the emulator starts without it.
+    The matrix is halved until it is small, then Taylor's series is summed and squared back.
+
+    Implemented here instead of with scipy, so that the emulator starts without it.
     """
     size = len(matrix)
     norm = max(sum(abs(entry) for entry in row) for row in matrix)

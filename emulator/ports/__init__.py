@@ -1,1 +1,1 @@
-"""Where clients come in: pseudo-terminal, TCP, RFC 2217."""
+"""The ports for clients: pseudo-terminal, TCP, RFC 2217."""

@@ -1,4 +1,4 @@
-"""A symbolic link that gives the pty a name that stays the same from run to run."""
+"""A symbolic link that gives the pty the same name in each run."""
 
 import errno
 import os
@@ -6,14 +6,14 @@ from contextlib import suppress
 from pathlib import Path
 
 _PTY_PREFIXES = ("/dev/pts/", "/dev/ttys", "/dev/ttyp")
-"""What the names of pseudo-terminals begin with: Linux, macOS, older BSDs."""
+"""How the names of pseudo-terminals start: Linux, macOS, older BSDs."""
 
 
 class DeviceLink:
-    """A link to a pty, put there atomically and taken away by `remove`.
+    """A link to a pty, created atomically and removed by `remove`.
 
     Raises:
-        FileExistsError: something else than a link to a pty is at the path, or the pty that it leads to is there.
+        FileExistsError: the path is not a link to a pty, or it is a link to a pty that still exists.
         OSError: the path cannot be written.
     """
 
@@ -21,17 +21,17 @@ class DeviceLink:
         self.path = path
         self._device = device
         self.replaced = _target(path, device)
-        """The pty that an older link at this path led to, or None."""
+        """The target of an older link at this path, or None."""
         if self.replaced is None:
             path.symlink_to(device)
         else:
             _replace(path, device)
 
     def lead_to(self, device: str) -> None:
-        """Lead to another device from now on.
+        """Point to another device from now on.
 
         Raises:
-            FileExistsError: something else than a link to a pty has taken the link's place, or another's link.
+            FileExistsError: the link was replaced by another file, or by another emulator's link.
             OSError: the path cannot be written.
         """
         _target(self.path, device)
@@ -39,24 +39,24 @@ class DeviceLink:
         self._device = device
 
     def remove(self) -> None:
-        """Take the link away, unless somebody else has put another one there since."""
+        """Remove the link, unless another program has replaced it."""
         with suppress(OSError):
             if str(self.path.readlink()) == self._device:
                 self.path.unlink()
 
 
 def _target(path: Path, device: str) -> str | None:
-    """Return the pty that the link leads to, or None when nothing is there.
+    """Return the pty that the link points to, or None if there is none.
 
-    A pty is there as long as the program that made it: a link to one, `device` excepted, is another emulator's.
+    A pty exists as long as the program that created it. A link to one, except `device`, belongs to another emulator.
     """
     if not os.path.lexists(path):
         return None
     target = str(path.readlink()) if path.is_symlink() else ""
     if not target.startswith(_PTY_PREFIXES):
-        raise FileExistsError(errno.EEXIST, "something else than a link to a pty is there")
+        raise FileExistsError(errno.EEXIST, "the path exists and is not a link to a pty")
     if target != device and Path(target).exists():
-        raise FileExistsError(errno.EEXIST, f"it leads to {target}, which another emulator serves")
+        raise FileExistsError(errno.EEXIST, f"it points to {target}, which another emulator serves")
     return target
 
 

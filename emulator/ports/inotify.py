@@ -1,4 +1,4 @@
-"""Tell who opens, writes and closes a device that this process holds open itself (Linux's inotify)."""
+"""Report who opens, writes and closes a device that this process itself holds open (Linux inotify)."""
 
 import ctypes
 import os
@@ -16,10 +16,10 @@ _READ_BYTES = 65536
 
 
 class DeviceWatch:
-    """A stream of what other openers of one device do, in their order.
+    """A stream of the actions of other programs on one device, in their order.
 
-    The kernel merges equal events that follow one another, so that two openings would count as one. It reports an
-    opening to the watch of the directory and to that of the device in turn: watching both, no two in a row are equal.
+    The kernel merges equal consecutive events, so two openings would count as one. It reports an opening to the watch
+    of the directory and to the watch of the device in turn. With both watches, no two consecutive events are equal.
     """
 
     def __init__(self, descriptor: int, device_watch: int) -> None:
@@ -28,7 +28,7 @@ class DeviceWatch:
 
     @classmethod
     def start(cls, device: Path) -> "DeviceWatch | None":
-        """Return a watch on the device, or None where the system gives none."""
+        """Return a watch on the device, or None if the system does not support it."""
         libc = ctypes.CDLL(None)
         if not hasattr(libc, "inotify_init1"):
             return None
@@ -43,7 +43,7 @@ class DeviceWatch:
         return cls(descriptor, device_watch)
 
     def events(self) -> Iterator[int]:
-        """Yield `OPENED`, `WRITTEN` and `CLOSED` as they came since the last call."""
+        """Yield `OPENED`, `WRITTEN` and `CLOSED` in the order of the events since the last call."""
         while data := self._read():
             position = 0
             while position < len(data):

@@ -1,4 +1,4 @@
-"""What a way in to the table is to the server: bytes both ways, and clients that come and go."""
+"""The interface of a port to the server: bytes in both directions, and clients that connect and disconnect."""
 
 from typing import Final, NamedTuple, Protocol
 
@@ -8,11 +8,11 @@ _HARMLESS: Final = (b"", b"H", b"L")
 
 
 class Arrival(NamedTuple):
-    """What clients did since the last look.
+    """The actions of clients since the last look.
 
-    `left_before` and `left_after` say that a client went away before or after `data` was sent: a half line that it
-    left behind ends there. `is_doubtful` says that the bytes are of several clients and that nobody can tell where
-    those of one end: none of their lines may set or move anything.
+    `left_before` and `left_after` state that a client disconnected before or after `data` was sent: its incomplete line
+    ends there. `is_doubtful` states that the bytes are from several clients and that the boundary is unknown: none of
+    their lines may set or move anything.
     """
 
     left_before: bool = False
@@ -22,56 +22,56 @@ class Arrival(NamedTuple):
 
 
 def spoiled(data: bytes) -> bytes:
-    """Return bytes whose lines change nothing: each that does more than read is refused for a bad byte."""
+    """Return bytes whose lines change nothing: each line that does more than read is refused because of a bad byte."""
     return b"\r".join(line if line in _HARMLESS else _BAD_BYTE + line for line in data.split(b"\r"))
 
 
 def changes_nothing(data: bytes) -> bool:
-    """Return whether all lines of some bytes only read, so that nothing of them is refused when they are spoiled."""
+    """Return whether all lines of some bytes only read, so that none of them is refused when they are spoiled."""
     return all(line.replace(_BAD_BYTE, b"") in _HARMLESS for line in data.split(b"\r"))
 
 
 class Port(Protocol):
-    """One way in to the table. Nothing here blocks."""
+    """One port of the table. Its methods do not block."""
 
     name: str
-    """What a client opens."""
+    """The name that a client opens."""
 
     @property
     def client_count(self) -> int:
-        """Clients that are there, as of the last `receive`."""
+        """Number of connected clients, as of the last `receive`."""
         ...
 
     @property
     def input_descriptors(self) -> tuple[int, ...]:
-        """What becomes readable when `receive` has something to return."""
+        """Descriptors that become readable when `receive` has something to return."""
         ...
 
     @property
     def output_descriptors(self) -> tuple[int, ...]:
-        """What becomes writable when `flush` can do something; empty when there is nothing to flush."""
+        """Descriptors that become writable when `flush` can send; empty when there is nothing to flush."""
         ...
 
     def receive(self) -> Arrival:
-        """Return what clients did since the last call."""
+        """Return the actions of clients since the last call."""
         ...
 
     def send(self, data: bytes) -> None:
-        """Give bytes to the client; what it does not take is lost in the end, as on a wire."""
+        """Send bytes to the client. Bytes that it does not read are lost in the end, as on a serial line."""
         ...
 
     def flush(self) -> None:
-        """Give the client more of what it has not taken yet."""
+        """Send more of the bytes that the client has not read yet."""
         ...
 
     def hang_up(self) -> None:
-        """Go away, as an adapter that is pulled out."""
+        """Disappear, as an adapter that is unplugged."""
         ...
 
     def come_back(self) -> None:
-        """Be there again after `hang_up`."""
+        """Reappear after `hang_up`."""
         ...
 
     def close(self) -> None:
-        """Give everything back to the system."""
+        """Release all resources of the system."""
         ...

@@ -1,7 +1,7 @@
-"""A pseudo-terminal that behaves as the serial port of the table (POSIX only).
+"""A pseudo-terminal that behaves like the serial port of the table (POSIX only).
 
-The device is raw and at the table's own rate before its name is known, the server holds it open for ever, nothing
-here blocks, and the clients that come and go are watched.
+The device is in raw mode and at the table's baud rate before its name is published. The server keeps it open, nothing
+here blocks, and the connection of clients is observed.
 """
 
 import fcntl
@@ -23,31 +23,31 @@ from emulator.ports.terminal_baud import get_baud, set_baud
 from emulator.ports.visit import Visit
 
 READ_BYTES = 256
-"""What one look takes of a client that stays."""
+"""Maximum number of bytes read at once from a connected client."""
 
 _PTY_BYTES = 1 << 17
-"""More than a pty holds."""
+"""More than the buffer of a pty."""
 
 _IN_FLIGHT_MS = 5
-"""Within this time after the bytes of a write, the kernel has told of it, on a busy machine too."""
+"""Within this time after the bytes of a write, the kernel has reported it, on a busy machine too."""
 
 _DEFAULT_BAUD = 9600
-_LOCAL_MODES = 3  # its place in the list of termios.tcgetattr
+_LOCAL_MODES = 3  # index in the list of termios.tcgetattr
 _ECHO = termios.ECHO | termios.ECHONL
 
 
 class PtyPort:
-    """The server's end of a pty whose other end a client opens as a serial port.
+    """The server's end of a pty. A client opens the other end as a serial port.
 
     Args:
-        baud: the table's rate in baud; 0 when bytes are not paced, and no rate of the client's is then wrong.
-        warn: takes one sentence for the person who runs the emulator.
+        baud: the table's rate in baud; 0 if bytes are not paced: then every rate of the client is accepted.
+        warn: called with one sentence for the user of the emulator.
 
     Attributes:
-        link: what leads to the device by another name.
+        link: the symbolic link to the device, if any.
 
     Raises:
-        OSError: the system has no pty to give.
+        OSError: the system has no free pty.
     """
 
     def __init__(self, baud: int, warn: Callable[[str], None]) -> None:
@@ -69,34 +69,35 @@ class PtyPort:
         self._watch = DeviceWatch.start(Path(self.name))
         if self._watch is None:
             self._warn(
-                f"this system does not tell who opens {self.name}: a client that leaves in mid-line goes unnoticed"
+                f"this system does not report who opens {self.name}: "
+                "a client that disconnects within a line is not noticed"
             )
         self._clients = 0
-        self._unread = False  # whether something may have been written since the device was read empty
+        self._unread = False  # whether bytes may have been written since the device was read empty
         self._client_baud = self._baud
 
     @property
     def client_count(self) -> int:
-        """Programs that have the device open, where the system tells."""
+        """Programs that have the device open, if the system reports them."""
         return self._clients
 
     @property
     def input_descriptors(self) -> tuple[int, ...]:
-        """What becomes readable when a client comes, goes or sends."""
+        """Descriptors that become readable when a client connects, disconnects or sends."""
         if self._is_away:
             return ()
         return (self._server,) if self._watch is None else (self._server, self._watch.descriptor)
 
     @property
     def output_descriptors(self) -> tuple[int, ...]:
-        """What becomes writable when the client has read something, while replies are held back for it."""
+        """Descriptors that become writable when the client has read, while replies wait for it."""
         return (self._server,) if self._outbox else ()
 
     def receive(self) -> Arrival:
-        """Return what clients have done since the last call."""
+        """Return the actions of clients since the last call."""
         visit = self._follow_clients(Visit(writers=int(self._unread), counted=self._unread))
         data = self._read(whole=visit.left)
-        visit = self._follow_clients(visit)  # What they did meanwhile may be in these bytes.
+        visit = self._follow_clients(visit)  # Their actions of this moment may be in these bytes.
         if visit.left and self._unread:
             data += self._read(whole=True)
             visit = self._follow_clients(visit)
@@ -108,8 +109,8 @@ class PtyPort:
         is_doubtful = bool(data) and visit.is_doubtful
         if is_doubtful and not changes_nothing(data) and not self._said_doubtful:
             self._warn(
-                f"two programs used {self.name} one right after the other, and nobody can tell which bytes are whose: "
-                "what came in one piece of both is not carried out"
+                f"two programs used {self.name} in immediate succession, and their bytes cannot be separated: "
+                "commands in these bytes are not executed"
             )
             self._said_doubtful = True
         if visit.another_wrote:
@@ -117,7 +118,7 @@ class PtyPort:
         return Arrival(data=data, left_after=True, is_doubtful=is_doubtful)
 
     def send(self, data: bytes) -> None:
-        """Give replies to the client; they are lost when nobody has the port open, or nobody reads it."""
+        """Send replies to the client. They are lost if nobody has the port open, or nobody reads it."""
         if self._is_away or (self._watch is not None and self._clients == 0):
             return
         self._end_echo()
@@ -128,27 +129,27 @@ class PtyPort:
             self._warn(f"the client on {self.name} does not read its replies: they are dropped")
 
     def flush(self) -> None:
-        """Give the client more of the replies that it has not taken yet."""
+        """Send more of the replies that the client has not read yet."""
         self._outbox.flush(partial(os.write, self._server))
 
     def hang_up(self) -> None:
-        """Go away, as an adapter that is pulled out: a client reads end of file, and the device is no more."""
+        """Disappear, as an adapter that is unplugged: a client reads end of file, and the device no longer exists."""
         self.close()
         self._is_away = True
         self._outbox.clear()
 
     def come_back(self) -> None:
-        """Be there again after `hang_up`: a new device, to which the link leads."""
+        """Reappear after `hang_up` with a new device. The link points to it."""
         self._open()
-        self._warn(f"the port has come back as {self.name}")
+        self._warn(f"the port is available again as {self.name}")
         if self.link is not None:
             try:
                 self.link.lead_to(self.name)
             except OSError as error:
-                self._warn(f"{self.link.path} does not lead to it: {error.strerror}")
+                self._warn(f"{self.link.path} does not point to it: {error.strerror}")
 
     def close(self) -> None:
-        """Close both ends; a client that is still there reads end of file."""
+        """Close both ends; a connected client reads end of file."""
         if self._is_away:
             return
         if self._watch is not None:
@@ -157,7 +158,7 @@ class PtyPort:
         os.close(self._server)
 
     def _read(self, whole: bool = False) -> bytes:
-        """Return bytes as the table hears them: all that are there, or no more than `READ_BYTES`."""
+        """Return bytes as the table receives them: all available bytes, or at most `READ_BYTES`."""
         self._end_echo()
         self._notice_rate()
         data = bytearray()
@@ -171,14 +172,14 @@ class PtyPort:
         return self._as_heard(bytes(data), self._client_baud, self._baud)
 
     def _follow_clients(self, visit: Visit) -> Visit:
-        """Return what was known of a visit with what clients have done since."""
+        """Return the present visit, updated with the actions of clients since then."""
         writers, counted, left, another_came = visit
         for event in self._watch.events() if self._watch is not None else ():
             if event == OPENED:
                 self._clients += 1
                 another_came = left
                 if self._clients == 2:
-                    self._warn(f"two programs have {self.name} open: each takes some of the other's replies")
+                    self._warn(f"two programs have {self.name} open: each receives some of the other's replies")
             elif event == CLOSED:
                 self._clients = max(0, self._clients - 1)
                 if self._clients == 0:
@@ -190,9 +191,9 @@ class PtyPort:
         return Visit(writers, counted, left, another_came)
 
     def _wait_for_a_write(self, visit: Visit) -> Visit:
-        """Return the visit with a write of the one that came, if its bytes are read already.
+        """Return the visit with a write of the new client, if its bytes have already been read.
 
-        The kernel tells of a write only after its bytes are there.
+        The kernel reports a write only after its bytes are available.
         """
         for _ in range(_IN_FLIGHT_MS):
             time.sleep(0.001)
@@ -203,7 +204,7 @@ class PtyPort:
         return visit
 
     def _end_echo(self) -> None:
-        """Switch off the echo that a client has switched on: the table would answer its own replies for ever."""
+        """Switch off the echo that a client has switched on: the table would reply to its own replies without end."""
         settings = termios.tcgetattr(self._server)
         if settings[_LOCAL_MODES] & _ECHO:
             settings = termios.tcgetattr(self._device)
@@ -212,22 +213,22 @@ class PtyPort:
             self._warn(f"a program switched the echo of {self.name} on (stty sane does so): it is switched off again")
 
     def _let_go(self) -> None:
-        """Forget a client that has left, and leave the device to the next one as the first one found it."""
+        """Discard the state of a client that has disconnected, and reset the device for the next one."""
         if self._outbox.dropped_bytes:
-            self._warn(f"{self._outbox.dropped_bytes} bytes of replies were dropped, since nobody read them")
+            self._warn(f"{self._outbox.dropped_bytes} bytes of replies were dropped, because nobody read them")
         self._outbox.clear()
         self._client_baud = self._baud
         if self._clients:
             return
         termios.tcflush(self._device, termios.TCIFLUSH)
-        # A terminal program may have locked the device, which otherwise ends only with the server.
+        # A terminal program may have locked the device, and the lock would last as long as the server.
         fcntl.ioctl(self._device, termios.TIOCNXCL)
         if termios.tcgetattr(self._device) != self._settings:
             termios.tcsetattr(self._device, termios.TCSANOW, self._settings)
             set_baud(self._device, self._baud or _DEFAULT_BAUD)
 
     def _notice_rate(self) -> None:
-        """Look up the client's rate, and say so when it is a new one that the table does not understand."""
+        """Read the client's baud rate, and warn if it has changed to one that the table does not understand."""
         client_baud = get_baud(self._server)
         if client_baud in {self._client_baud, 0} or not self._baud:
             return

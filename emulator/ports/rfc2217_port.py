@@ -1,7 +1,9 @@
-"""The table's serial port over telnet (RFC 2217), for pyserial's `rfc2217://host:port`: baud rate and break travel too.
+"""The table's serial port over telnet (RFC 2217), for pyserial's `rfc2217://host:port`.
 
-pyserial's `PortManager` speaks telnet; here is the port that it believes to manage, and a guard: whatever a client
-sends, the worst that happens is that its request is ignored.
+It also transmits baud rate and break.
+
+pyserial's `PortManager` implements telnet. This module has the port that it manages, and a guard: an invalid request of
+a client is ignored.
 """
 
 import struct
@@ -16,22 +18,22 @@ from emulator.ports.tcp_port import TcpPort
 
 _DEFAULT_BAUD = 9600
 _LONGEST_REQUEST = 64
-"""Bytes of a request between its beginning and its end; those of RFC 2217 have six at most."""
+"""Maximum number of bytes of a request; those of RFC 2217 have at most six."""
 _BREAK = b"\0"
-"""What a receiver reads of a line that is held low."""
+"""What a receiver reads from a line that is held low."""
 
 
 class Rfc2217Port(TcpPort):
-    """A listening socket as `TcpPort`, whose client sets the line as that of an adapter in its own computer.
+    """A listening socket like `TcpPort`. The client can set the line like that of a local adapter.
 
     Args:
         host: name or address to listen on.
-        port: TCP port, 0 for any that is free.
-        baud: the table's rate in baud; 0 when bytes are not paced, and no rate of the client's is then wrong.
-        warn: takes one sentence for the person who runs the emulator.
+        port: TCP port; 0 picks a free port.
+        baud: the table's rate in baud; 0 if bytes are not paced: then every rate of the client is accepted.
+        warn: called with one sentence for the user of the emulator.
 
     Raises:
-        OSError: the address cannot be listened on.
+        OSError: the address is not available.
     """
 
     scheme = "rfc2217"
@@ -43,9 +45,9 @@ class Rfc2217Port(TcpPort):
         self._telnet: PortManager | None = None
 
     def _greet(self) -> None:
-        """Begin anew, for a client that has just come: it finds the line at the table's own rate."""
+        """Reset the state for a new client: the line has the table's baud rate."""
         self._line = _Line(self._baud, self._purge)
-        # Both have all that it uses of pyserial's ports.
+        # Both have all methods of pyserial's ports that it uses.
         self._telnet = PortManager(self._line, _Answers(self._outbox))  # type: ignore[arg-type]  # see above
         self.flush()
 
@@ -54,7 +56,7 @@ class Rfc2217Port(TcpPort):
         self._outbox.clear()
 
     def _decoded(self, data: bytes) -> bytes:
-        """Return bytes as the table hears them, without those that are telnet's."""
+        """Return bytes as the table receives them, without the bytes of telnet."""
         heard, at_one_rate = b"", b""
         for byte in data:
             before = self._line.baudrate
@@ -68,13 +70,13 @@ class Rfc2217Port(TcpPort):
         return heard + self._at_rate(at_one_rate, self._line.baudrate, self._baud)
 
     def _without_telnet(self, byte: bytes) -> bytes:
-        """Return the byte if it is the table's, and nothing if it is telnet's."""
+        """Return the byte if it is for the table, and nothing if it belongs to telnet."""
         telnet = self._telnet
         if telnet is None:
             return byte
         try:
             passed = b"".join(telnet.filter(byte))
-        except (ValueError, TypeError, KeyError, struct.error):  # a request that is cut, or has a value that is none
+        except (ValueError, TypeError, KeyError, struct.error):  # a truncated request, or one with an invalid value
             telnet.suboption, telnet.mode = None, _NORMAL
             return b""
         if telnet.suboption is not None:
@@ -82,7 +84,7 @@ class Rfc2217Port(TcpPort):
         return passed
 
     def _encoded(self, data: bytes) -> bytes:
-        """Return bytes as the client reads them, escaped for telnet."""
+        """Return bytes as the client receives them, escaped for telnet."""
         return self._at_rate(data, self._baud, self._line.baudrate).replace(
             serial.rfc2217.IAC, serial.rfc2217.IAC_DOUBLED
         )
@@ -103,7 +105,7 @@ _NORMAL: int = serial.rfc2217.M_NORMAL
 
 
 class _Answers:
-    """Where telnet's answers go: to the client, whole."""
+    """Where telnet's replies are sent: to the client, whole."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox = outbox
@@ -113,11 +115,11 @@ class _Answers:
 
 
 class _Line:
-    """The port that telnet manages: it has a rate and a break, and else the three wires of the table.
+    """The port that telnet manages: it has a baud rate, a break, and the three wires of the table.
 
-    Its names are pyserial's. What the table does not have (parity, 7 bits, flow control) cannot be set, and the client
-    is told so; lines that the table does not read may be set, and those that it does not drive are what a client that
-    waits for them needs.
+    Its names are pyserial's. Parity, 7 bits and flow control do not exist on the table: they cannot be set, and the
+    client receives an error. Output lines may be set without effect. Input lines have the values that a waiting client
+    needs.
     """
 
     cts = dsr = cd = True
@@ -127,7 +129,7 @@ class _Line:
 
     def __init__(self, baud: int, purge: Callable[[], None]) -> None:
         self.baudrate = baud or _DEFAULT_BAUD
-        self.breaks = 0  # that have begun and are not heard yet
+        self.breaks = 0  # number of breaks that have started and are not yet processed
         self._is_broken = False
         self._purge = purge
 
@@ -139,7 +141,7 @@ class _Line:
     @bytesize.setter
     def bytesize(self, bits: int) -> None:
         if bits != serial.EIGHTBITS:
-            raise ValueError("the table talks 8N1")
+            raise ValueError("the table uses 8N1")
 
     @property
     def parity(self) -> str:
@@ -149,7 +151,7 @@ class _Line:
     @parity.setter
     def parity(self, parity: str) -> None:
         if parity != serial.PARITY_NONE:
-            raise ValueError("the table talks 8N1")
+            raise ValueError("the table uses 8N1")
 
     @property
     def stopbits(self) -> float:
@@ -159,7 +161,7 @@ class _Line:
     @stopbits.setter
     def stopbits(self, bits: float) -> None:
         if bits != serial.STOPBITS_ONE:
-            raise ValueError("the table talks 8N1")
+            raise ValueError("the table uses 8N1")
 
     @property
     def break_condition(self) -> bool:
@@ -172,8 +174,8 @@ class _Line:
         self._is_broken = is_on
 
     def reset_input_buffer(self) -> None:
-        """Forget the replies that the client has not taken yet."""
+        """Discard the replies that the client has not read yet."""
         self._purge()
 
     def reset_output_buffer(self) -> None:
-        """Do nothing: what was sent is on the line already."""
+        """Do nothing: the written bytes are on the line already."""

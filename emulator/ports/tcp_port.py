@@ -11,16 +11,16 @@ from protocol.data_file import shown
 
 LOOPBACK = "127.0.0.1"
 READ_BYTES = 256
-"""What one look takes."""
+"""Maximum number of bytes read at once."""
 
 
 def parse_address(text: str) -> tuple[str, int]:
-    """Return host and port of `[HOST:]PORT`; the host is the loopback address unless it is given.
+    """Return host and port of `[HOST:]PORT`; the default host is the loopback address.
 
     An IPv6 address stands in brackets: `[::1]:7000`.
 
     Raises:
-        ValueError: the text is no such address.
+        ValueError: the text is not such an address.
     """
     host, _, port = text.rpartition(":")
     bare = host[1:-1] if host.startswith("[") and host.endswith("]") else host
@@ -31,15 +31,15 @@ def parse_address(text: str) -> tuple[str, int]:
 
 
 class TcpPort:
-    """A listening socket that serves one client at a time; a second one is turned away at once.
+    """A listening socket that serves one client at a time. Further clients are disconnected at once.
 
     Args:
         host: name or address to listen on.
-        port: TCP port, 0 for any that is free.
-        warn: takes one sentence for the person who runs the emulator.
+        port: TCP port; 0 picks a free port.
+        warn: called with one sentence for the user of the emulator.
 
     Raises:
-        OSError: the address cannot be listened on.
+        OSError: the address is not available.
     """
 
     scheme = "socket"
@@ -56,7 +56,7 @@ class TcpPort:
         shown = f"[{host}]" if ":" in host else host
         self.name = f"{self.scheme}://{shown}:{bound_port}"
         if not _is_own_computer(self._listener.getsockname()[0]):
-            warn(f"{self.name} is open to other computers: anybody who reaches it may drive the table")
+            warn(f"{self.name} is open to other computers: anyone with network access can move the table")
 
     @property
     def client_count(self) -> int:
@@ -65,23 +65,23 @@ class TcpPort:
 
     @property
     def input_descriptors(self) -> tuple[int, ...]:
-        """What becomes readable when a client comes, goes or sends."""
+        """Descriptors that become readable when a client connects, disconnects or sends."""
         listener = self._listener.fileno()
         return (listener,) if self._client is None else (listener, self._client.fileno())
 
     @property
     def output_descriptors(self) -> tuple[int, ...]:
-        """What becomes writable when the client has read something, while replies are held back for it."""
+        """Descriptors that become writable when the client has read, while replies wait for it."""
         return (self._client.fileno(),) if self._client is not None and self._outbox else ()
 
     def receive(self) -> Arrival:
-        """Return what the client has done since the last call."""
+        """Return the actions of the client since the last call."""
         arrival = self._read()
         self._accept()
         return arrival
 
     def send(self, data: bytes) -> None:
-        """Give replies to the client; they are lost when there is none, or it does not read."""
+        """Send replies to the client. They are lost if there is none, or if it does not read."""
         if self._client is None:
             return
         was_dropping = bool(self._outbox.dropped_bytes)
@@ -91,24 +91,24 @@ class TcpPort:
             self._warn(f"the client on {self.name} does not read its replies: they are dropped")
 
     def flush(self) -> None:
-        """Give the client more of the replies that it has not taken yet."""
+        """Send more of the replies that the client has not read yet."""
         if self._client is not None:
             try:
                 self._outbox.flush(self._client.send)
             except OSError:
-                self._outbox.clear()  # The connection is broken: the next read says so.
+                self._outbox.clear()  # The connection is broken: the next read reports it.
 
     def hang_up(self) -> None:
-        """Go away, as an adapter that is pulled out: clients are turned away at once."""
+        """Disappear, as an adapter that is unplugged: clients are disconnected at once."""
         self._hang_up()
         self._is_away = True
 
     def come_back(self) -> None:
-        """Be there again after `hang_up`."""
+        """Reappear after `hang_up`."""
         self._is_away = False
 
     def close(self) -> None:
-        """Hang up and stop listening."""
+        """Disconnect and stop listening."""
         self._hang_up()
         self._listener.close()
 
@@ -127,7 +127,7 @@ class TcpPort:
         return Arrival(data=self._decoded(data))
 
     def _accept(self) -> None:
-        # A client may be gone again before it is accepted.
+        # A client may have disconnected before it is accepted.
         with suppress(OSError):
             client, (host, port, *_) = self._listener.accept()
             if self._is_away:
@@ -138,22 +138,24 @@ class TcpPort:
                 self._greet()
             else:
                 client.close()
-                self._warn(f"a second client ({host}, port {port}) was turned away: {self.name} serves one at a time")
+                self._warn(
+                    f"a second client ({host}, port {port}) was refused: {self.name} serves one client at a time"
+                )
 
     def _greet(self) -> None:
-        """Say to a client that has just come what it needs: here nothing."""
+        """Send what a new client needs: here nothing."""
 
     def _decoded(self, data: bytes) -> bytes:
-        """Return bytes as the table hears them."""
+        """Return bytes as the table receives them."""
         return data
 
     def _encoded(self, data: bytes) -> bytes:
-        """Return bytes as the client reads them."""
+        """Return bytes as the client receives them."""
         return data
 
     def _hang_up(self) -> None:
         if self._outbox.dropped_bytes:
-            self._warn(f"{self._outbox.dropped_bytes} bytes of replies were dropped, since nobody read them")
+            self._warn(f"{self._outbox.dropped_bytes} bytes of replies were dropped, because nobody read them")
         self._outbox.clear()
         if self._client is not None:
             self._client.close()
@@ -167,7 +169,7 @@ def _is_own_computer(address: str) -> bool:
 def _prepare(client: socket.socket) -> None:
     client.setblocking(False)
     client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    # A client whose machine has died must not keep the table for ever.
+    # A client whose machine has failed must not block the table without end.
     client.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for option, value in (("TCP_KEEPIDLE", 10), ("TCP_KEEPINTVL", 5), ("TCP_KEEPCNT", 3)):
         if hasattr(socket, option):  # not on every system

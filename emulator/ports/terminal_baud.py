@@ -1,12 +1,12 @@
-"""The baud rate of a terminal device, odd rates included (POSIX only)."""
+"""The baud rate of a terminal device, including nonstandard rates (POSIX only)."""
 
 import fcntl
 import struct
 import sys
 import termios
 
-# Linux keeps any rate as a number in struct termios2: four flag words, the line discipline and 19 control
-# characters, then input and output rate. These request codes are those of x86, ARM and RISC-V.
+# Linux stores any rate as a number in struct termios2: four flag words, the line discipline and 19 control characters,
+# then input and output rate. These request codes are valid for x86, ARM and RISC-V.
 _TERMIOS2 = struct.Struct("4I20s2I")
 _TCGETS2 = 0x802C542A
 _TCSETS2 = 0x402C542B
@@ -14,11 +14,11 @@ _RATE_MASK = 0o010017
 _RATE_IS_A_NUMBER = 0o010000
 
 _RATE_CODES = {int(name[1:]): getattr(termios, name) for name in dir(termios) if name[0] == "B" and name[1:].isdigit()}
-_INPUT_RATE, _OUTPUT_RATE = 4, 5  # places in the list of termios.tcgetattr
+_INPUT_RATE, _OUTPUT_RATE = 4, 5  # indices in the list of termios.tcgetattr
 
 
 def get_baud(descriptor: int) -> int:
-    """Return the rate in baud that a terminal is set to, or 0 when that cannot be told."""
+    """Return the rate in baud that a terminal is set to, or 0 if it cannot be read."""
     if sys.platform == "linux":
         try:
             *_, baud = _TERMIOS2.unpack(fcntl.ioctl(descriptor, _TCGETS2, bytes(_TERMIOS2.size)))

@@ -1,16 +1,16 @@
-"""Whose bytes are they? What one look at a device, which several clients share one after the other, can tell of it."""
+"""Assign the bytes of one look at a device to its clients, which share it one after the other."""
 
 from typing import NamedTuple
 
 
 class Visit(NamedTuple):
-    """What is known of the clients of one look at the device, who may have come and gone one after the other.
+    """The state of the clients in one look at the device. They may have connected and disconnected one after the other.
 
     Attributes:
-        writers: clients of whom the bytes of this look may hold some.
-        counted: whether the one that is there now is among them.
-        left: a client has left, and no other was there.
-        another_came: after that, one has opened the device.
+        writers: number of clients that may have sent some of the bytes of this look.
+        counted: whether the present client is among them.
+        left: a client has disconnected, and no other was connected.
+        another_came: after that, another one has opened the device.
     """
 
     writers: int
@@ -20,10 +20,10 @@ class Visit(NamedTuple):
 
     @property
     def another_wrote(self) -> bool:
-        """Whether a client is there who came when another had left, and has written."""
+        """Whether a client is connected that came after another had disconnected, and has written."""
         return self.another_came and self.counted
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether the bytes may be of several clients: any line may then be half of one's and half of another's."""
+        """Whether the bytes may be from several clients: any line may then mix bytes of two clients."""
         return self.writers > 1

@@ -1,1 +1,1 @@
-"""The running emulator: clock, signals, control channel, trace."""
+"""The running emulator: clock, signals, control channel and trace."""

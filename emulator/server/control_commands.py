@@ -1,7 +1,7 @@
-"""The control channel: commands to a running emulator beside the serial line.
+"""The control channel: commands to a running emulator, separate from the serial line.
 
-A request is one line of JSON, `{"command": NAME, PARAMETER: NUMBER, ...}`; its answer is one line, `{"ok": true, ...}`
-or `{"ok": false, "error": SENTENCE}`. `control` carries them.
+A request is one line of JSON, `{"command": NAME, PARAMETER: NUMBER, ...}`. Its reply is one line, `{"ok": true, ...}`
+or `{"ok": false, "error": SENTENCE}`. `control` transmits them.
 """
 
 import json
@@ -16,33 +16,33 @@ from protocol.data_file import shown
 
 
 class Stand(Protocol):
-    """What commands act on: a table, and the running server that alone knows the clock."""
+    """The target of commands: a table, and the running server, which has the clock."""
 
     @property
     def table(self) -> Bench:
-        """The table; to trigger it at its exact instant is for the server."""
+        """The table. Only the server can trigger it at an exact instant."""
         ...
 
     @property
     def time_scale(self) -> float:
-        """Simulated seconds in a real second."""
+        """Simulated seconds per real second."""
         ...
 
     def trigger(self) -> None:
-        """Latch the encoder at this instant."""
+        """Latch the encoder now."""
         ...
 
     def set_time_scale(self, time_scale: float) -> None:
-        """Run at another rate from now on."""
+        """Change the time scale from now on."""
         ...
 
     def quit(self) -> None:
-        """End when the present events are served."""
+        """End the emulator when the present events are processed."""
         ...
 
 
 class Command(NamedTuple):
-    """One verb of the control channel; `run` returns what its answer says beyond `ok`."""
+    """One command of the control channel; `run` returns the fields of its reply without `ok`."""
 
     help: str
     parameters: tuple[Parameter, ...]
@@ -69,10 +69,10 @@ COMMANDS: Mapping[str, Command] = {
         "show the table's constants that its clients may rely on", (), lambda stand, _: stand.table.facts._asdict()
     ),
     "load-torque": Command(
-        "load the table with a constant torque",
+        "apply a constant load torque",
         (
             Parameter(
-                "torque_Nm", -1000.0, 1000.0, "torque at the table's axis in Nm; positive resists forward rotation"
+                "torque_Nm", -1000.0, 1000.0, "torque at the table's axis in Nm; positive opposes forward rotation"
             ),
         ),
         lambda stand, given: stand.table.set_load_torque(given["torque_Nm"]),
@@ -93,15 +93,15 @@ COMMANDS: Mapping[str, Command] = {
     ),
     "quit": Command("end the emulator, as SIGTERM does", (), lambda stand, _: stand.quit()),
 } | {f"fault-{kind}": _fault_command(kind) for kind in KINDS}
-"""Every verb, in one place: the server runs them, the command-line client shows them."""
+"""All commands, in one place. The server runs them, and the command-line client lists them."""
 
 
 class RequestError(ValueError):
-    """A request that cannot be carried out; the message is the answer's sentence."""
+    """A request that cannot be executed. The message is the sentence of the reply."""
 
 
 def answer(request: bytes, stand: Stand) -> bytes:
-    """Carry out one request and return its answer; a bad request changes nothing."""
+    """Execute one request and return its reply. An invalid request changes nothing."""
     try:
         command, given = _parse(request)
         result = command.run(stand, given) or {}
@@ -130,11 +130,11 @@ def _parse(request: bytes) -> tuple[Command, dict[str, float]]:
     }
 
 
-def _parsed_line(line: bytes) -> Any:  # noqa: ANN401  # whatever JSON holds
+def _parsed_line(line: bytes) -> Any:  # noqa: ANN401  # any JSON value
     """Return the value of a line of JSON.
 
     Raises:
-        RequestError: it is not JSON, nested too deep, or a name occurs twice in an object.
+        RequestError: the line is not JSON, it is nested too deeply, or a name occurs twice in an object.
     """
     try:
         return json.loads(line, object_pairs_hook=_object)
@@ -158,5 +158,5 @@ def _number(command: str, parameter: Parameter, value: Any) -> float:  # noqa: A
 
 
 def refusal(sentence: str) -> bytes:
-    """Return the answer to a request that is not carried out."""
+    """Return the reply to a request that is not executed."""
     return json.dumps({"ok": False, "error": sentence}).encode() + b"\n"

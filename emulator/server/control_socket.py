@@ -1,4 +1,4 @@
-"""The control channel's Unix socket, open to its owner only: a line for each request, a line for each answer."""
+"""The Unix socket of the control channel, accessible only to its owner: one line per request, one line per reply."""
 
 import errno
 import os
@@ -9,31 +9,31 @@ from pathlib import Path
 from emulator.server.control_commands import Stand, answer, refusal
 
 LONGEST_REQUEST = 4096
-"""Bytes in a request, its line feed included."""
+"""Maximum number of bytes of a request, including its line feed."""
 
 MOST_CLIENTS = 64
-"""Clients at once; a crowd would take all descriptors that the system allows."""
+"""Maximum number of clients: too many would use all descriptors that the system allows."""
 
 _BACKLOG = 16
 _OWNER_ONLY = 0o177
-"""The mask of permissions that a new socket must not have."""
+"""The permissions that a new socket must not have."""
 
 
 class ControlSocket:
-    """The listening end; up to `MOST_CLIENTS` may be there at once.
+    """The listening end, with at most `MOST_CLIENTS` clients at once.
 
     Args:
-        path: where the socket is put. One that an emulator which has died left behind is replaced.
+        path: path of the socket. A socket that an ended emulator left is replaced.
 
     Raises:
-        OSError: something else is at the path, another emulator listens there, or it cannot be written.
+        OSError: another file is at the path, another emulator listens there, or the path is not writable.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         _clear_stale(path)
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        # The mask, unlike a later chmod, leaves no moment in which others can connect.
+        # Unlike a later chmod, the mask leaves no moment in which others can connect.
         mask = os.umask(_OWNER_ONLY)
         try:
             self._listener.bind(str(path))
@@ -49,14 +49,14 @@ class ControlSocket:
 
     @property
     def input_descriptors(self) -> tuple[int, ...]:
-        """What becomes readable when a client comes, goes or asks."""
+        """Descriptors that become readable when a client connects, disconnects or sends a request."""
         return (self._listener.fileno(), *(client.fileno() for client in self._clients))
 
     def serve(self, stand: Stand) -> None:
-        """Take in new clients and answer every request that has come in whole."""
-        # Nobody is left, or the next one is gone again, or the system is short of descriptors: then it waits.
+        """Accept new clients and reply to every complete request."""
+        # No client is waiting, or it has disconnected, or the system has no free descriptor: then it waits.
         with suppress(OSError):
-            for _ in range(_BACKLOG):  # and no more at a time: a crowd must not keep the table from its clients
+            for _ in range(_BACKLOG):  # no more at a time: many requests must not delay the clients of the table
                 self._welcome(self._listener.accept()[0])
         for client in list(self._clients):
             if not self._serve_client(client, stand):
@@ -64,7 +64,7 @@ class ControlSocket:
                 client.close()
 
     def close(self) -> None:
-        """Hang up and remove the socket, unless another has taken its place."""
+        """Disconnect all clients and remove the socket, unless another one has replaced it."""
         for client in self._clients:
             client.close()
         self._listener.close()
@@ -81,7 +81,7 @@ class ControlSocket:
             client.sendall(refusal(f"too many clients: {MOST_CLIENTS} are connected already"))
 
     def _serve_client(self, client: socket.socket, stand: Stand) -> bool:
-        """Return whether the client stays: not when it hung up, or lets its answers pile up."""
+        """Return whether the client stays connected: not after a disconnect, or if it does not read its replies."""
         try:
             data = client.recv(LONGEST_REQUEST)
         except BlockingIOError:
@@ -102,7 +102,7 @@ class ControlSocket:
 
 
 def _clear_stale(path: Path) -> None:
-    """Remove a socket that nobody listens on; leave anything else alone."""
+    """Remove a socket that nobody listens on. Do not change anything else."""
     if not path.is_socket():
         return
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
@@ -113,5 +113,5 @@ def _clear_stale(path: Path) -> None:
             path.unlink()
             return
         except BlockingIOError:
-            pass  # The listener's queue is full: it lives, although it takes nobody in.
+            pass  # The listener's queue is full: the emulator is alive, although it accepts no client.
     raise OSError(errno.EADDRINUSE, "another emulator listens there")

@@ -1,7 +1,7 @@
-"""The running emulator: one loop that keeps the table level with the clock and carries bytes between it and its ports.
+"""The running emulator: one loop that keeps the table at the clock's time and transfers bytes to and from its ports.
 
-The table is advanced lazily: when a client or a signal calls, when a byte on the line is due, and every now and then
-so that there is never much to catch up with.
+The table is advanced only when needed: when a client or a signal arrives, and when a byte on the line is due. It is
+also advanced periodically, so that there is never much to catch up with.
 """
 
 from collections import deque
@@ -21,31 +21,31 @@ if TYPE_CHECKING:
 _LONGEST_SLEEP_S = 0.02
 _CATCH_UP_TICKS = 500
 _CATCH_UP_S = 0.05
-"""Longest stretch of catching up before clients are heard again."""
+"""Maximum time of catching up before clients are served again."""
 _GIVE_UP_S = 0.5
-"""How far simulated time may be behind the clock before the clock is held back."""
+"""Maximum lag of simulated time behind the clock before the clock is held back."""
 _LINE_BUFFER_BYTES = 256
-"""What waits for a slow line, in the driver of a real one; a client that sends more is made to wait."""
+"""Maximum number of bytes in the buffer of a slow line, as in a real driver. A client that sends more has to wait."""
 _MOST_ARRIVALS = 64
-"""Looks at clients whose bytes wait until the line has carried those of one that has left."""
+"""Interval of checks of clients whose bytes wait for the end of another client's bytes on the line."""
 _LAST_FRACTION = 1.0 - 2.0**-20
-"""The latest that an edge can be in a tick."""
+"""Maximum share of a tick at which an edge can occur."""
 _TRIGGER_SIGNAL = "SIGUSR1"
 _END_SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 SERVED_SIGNALS = (*_END_SIGNALS, _TRIGGER_SIGNAL)
-"""What a `SignalWatch` for the server collects."""
+"""Descriptors for a `SignalWatch` of the server."""
 
 
 class Server:
-    """Serves a table in real time, on any number of ports that are all the same wire.
+    """Serves a table in real time, on any number of ports that share one line.
 
     Args:
-        table: the table; while the server runs, only its control channel touches it besides.
-        clock: counts the ticks that are due; at 0 when the table was switched on.
-        ports: where clients come in. Replies go to all of them.
+        table: the table. While the server runs, only its control channel accesses it besides.
+        clock: counts the due ticks; at 0 when the table was switched on.
+        ports: the ports for clients. Replies are sent to all of them.
         signals: entered before the ports' names are published.
-        control: the control channel, if there is one.
-        warn: takes one sentence for the person who runs the emulator.
+        control: the control channel, if any.
+        warn: called with one sentence for the user of the emulator.
     """
 
     def __init__(
@@ -92,31 +92,31 @@ class Server:
 
     @property
     def time_scale(self) -> float:
-        """Simulated seconds in a real second."""
+        """Simulated seconds per real second."""
         return self._clock.time_scale
 
     def trigger(self) -> None:
-        """Latch the encoder at this instant."""
+        """Latch the encoder now."""
         fraction = self._clock.now_ticks() - self.table.tick
-        if fraction <= 0.0:  # another edge in the tick that the one before it has brought to its end
+        if fraction <= 0.0:  # another edge in the tick that the previous edge has completed
             self.table.trigger()
             return
         self.table.trigger(min(fraction, _LAST_FRACTION))
-        # The tick that the edge is in must be over before a client can ask for the latch.
+        # The tick of the edge must be complete before a client can read the latch.
         self.table.advance(1)
         self._send_replies()
 
     def set_time_scale(self, time_scale: float) -> None:
-        """Run at another rate from now on."""
+        """Change the time scale from now on."""
         self._clock.set_time_scale(time_scale)
         self._said_slow = False
 
     def quit(self) -> None:
-        """End `run` when the present events are served."""
+        """End `run` when the present events are processed."""
         self._running = False
 
     def _wait(self) -> tuple[set[int], set[int]]:
-        """Return the descriptors that can be read and written, once there are any or the table is due."""
+        """Return the readable and the writable descriptors, once there are any or the table is due."""
         inputs = [self._signals.descriptor]
         if self._control:
             inputs += self._control.input_descriptors
@@ -126,7 +126,7 @@ class Server:
         return wait_for(inputs, outputs, self._sleep_s())
 
     def _line_is_full(self) -> bool:
-        """Return whether clients must wait, as behind any slow line."""
+        """Return whether clients must wait, as on any slow line."""
         if self.table.ticks_until_byte() is None:
             return False
         waiting = self.table.status().received_queue + sum(len(arrival.data) for arrival in self._arrivals)
@@ -139,7 +139,7 @@ class Server:
         return min(_LONGEST_SLEEP_S, self._clock.wall_s_until(self.table.tick + ticks))
 
     def _catch_up(self) -> None:
-        """Bring the table level with the clock, or the clock with the table when that is too far ahead."""
+        """Advance the table to the clock, or set the clock back to the table if the lag is too large."""
         end_s = self._clock.wall_s() + _CATCH_UP_S
         while (behind := int(self._clock.now_ticks()) - self.table.tick) > 0:
             if behind > _GIVE_UP_S * self._clock.ticks_per_wall_s:
@@ -151,7 +151,7 @@ class Server:
             self._send_replies()
 
     def _hold_the_clock_back(self, behind: int) -> None:
-        """Leave out the time for which the process was stopped, or the machine too slow."""
+        """Skip the time in which the process was stopped, or the machine too slow."""
         self._clock.set_ticks(self.table.tick)
         if not self._said_slow:
             self._warn(
@@ -162,7 +162,7 @@ class Server:
             self._said_slow = True
 
     def _follow_hang_up(self) -> None:
-        """Take the ports away, or bring them back, as a fault of the table says."""
+        """Remove the ports, or open them again, as a fault of the table requires."""
         self._hung_up = self.table.hung_up
         for port in self._ports:
             if self._hung_up:
@@ -171,7 +171,10 @@ class Server:
                 port.come_back()
 
     def _serve_arrivals(self) -> None:
-        """Give the table what clients have sent; what came after one that has left waits for the end of that."""
+        """Pass the clients' bytes to the table.
+
+        Bytes that follow a disconnect wait until the earlier bytes are transmitted.
+        """
         while self._arrivals and not self._leaving:
             arrival = self._arrivals.popleft()
             if arrival.left_before:
@@ -186,11 +189,14 @@ class Server:
     def _warn_of_two(self) -> None:
         busy = [port.name for port in self._ports if port.client_count]
         if len(busy) > 1 and not self._said_two:
-            self._warn(f"{' and '.join(busy)} have clients at once: each hears the replies to both")
+            self._warn(f"{' and '.join(busy)} have clients at the same time: each receives the replies to both")
         self._said_two = len(busy) > 1
 
     def _let_go(self) -> None:
-        """Forget a client that has left, once the table has all that it sent: nothing of it may meet the next one."""
+        """Remove a disconnected client once the table has received all of its bytes.
+
+        So they cannot mix with the next client's.
+        """
         if self._leaving and self.table.ticks_until_byte() is None:
             self.table.disconnect()
             self._leaving = False

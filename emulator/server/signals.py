@@ -1,4 +1,4 @@
-"""Signals as something to select on, so that they are handled between other events and never in the midst of one."""
+"""Signals as a descriptor for select, so that they are handled between other events and never during one."""
 
 import signal
 import socket
@@ -7,11 +7,11 @@ from typing import Self
 
 
 class SignalWatch:
-    """Collects signals while it is entered; what they did before is put back afterwards.
+    """Collects signals while it is entered. The earlier handlers are restored afterwards.
 
     Args:
-        names: such as `SIGTERM`. Those that the system does not have are left out, and so is `SIGHUP` where it is
-            ignored: whoever starts a program with nohup wants it to outlive the terminal.
+        names: such as `SIGTERM`. Names that the system does not have are ignored. An ignored `SIGHUP` stays ignored: a
+            program started with nohup must outlive its terminal.
     """
 
     def __init__(self, *names: str) -> None:
@@ -22,7 +22,7 @@ class SignalWatch:
 
     @property
     def descriptor(self) -> int:
-        """What becomes readable when a signal has come."""
+        """A descriptor that becomes readable when a signal has been received."""
         return self._reader.fileno()
 
     def received(self) -> list[signal.Signals]:
@@ -52,4 +52,4 @@ def _is_nohup(name: str) -> bool:
 
 
 def _collected(number: int, frame: FrameType | None) -> None:
-    """Do nothing: that there is a handler makes the interpreter write the signal's number to the wake-up descriptor."""
+    """Do nothing: with a handler, the interpreter writes the signal's number to the wake-up descriptor."""

@@ -1,1 +1,1 @@
-"""The whole table: plant, firmware and line, tick by tick."""
+"""The whole table: plant, firmware and line, computed tick by tick."""

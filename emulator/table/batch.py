@@ -1,7 +1,7 @@
 """Many ticks at machine speed: the functions of `tick`, compiled by numba.
 
-For tuning, Monte Carlo and the verification of plans. The compiled functions are those that the emulator interprets,
-so states agree to the last bit; a test holds them to it. This module needs numpy and numba, the emulator does not.
+For tuning, Monte Carlo and the verification of plans. The compiled functions are those that the emulator interprets, so
+the states are bit-identical; a test checks this. This module needs numpy and numba, the emulator does not.
 """
 
 from functools import cache
@@ -36,11 +36,13 @@ COLUMNS: Final = (
 )
 
 Motions = NDArray[np.int64]
-"""(n, 5): tick, MOVE_TO or MOVE_BY, angle, speed, acceleration; the last three with the table's motion bits, as the
-firmware holds them. In the order of their ticks."""
+"""(n, 5): tick, MOVE_TO or MOVE_BY, angle, speed, acceleration.
+
+The last three have the table's motion bits, as in the firmware. Rows are in the order of their ticks.
+"""
 
 Loads = NDArray[np.float64]
-"""(n, 2): tick, and the load torque in Nm from then on. In the order of their ticks."""
+"""(n, 2): tick, and the load torque in Nm from then on. Rows are in the order of their ticks."""
 
 NO_LOADS: Loads = np.empty((0, 2))
 
@@ -48,10 +50,10 @@ NO_LOADS: Loads = np.empty((0, 2))
 def run(
     constants: TableConstants, state: TableState, ticks: int, motions: Motions, loads: Loads = NO_LOADS, every: int = 1
 ) -> tuple[TableState, NDArray[np.float64]]:
-    """Return the state after `ticks`, and a row of `COLUMNS` after each `every` of them.
+    """Return the state after `ticks`, and a row of `COLUMNS` after every `every` ticks.
 
-    A motion or load that is due at tick k acts before the step from k to k + 1. Signals wait for the end of the run:
-    an interrupt that is raised in one of numba's callbacks is lost, or crashes the process.
+    A motion or load that is due at tick k acts before the step from k to k + 1. Signals are deferred to the end of the
+    run: an interrupt that is raised in a callback of numba is lost, or crashes the process.
     """
     samples = np.empty((ticks // every, len(COLUMNS)))
     with signals_wait():

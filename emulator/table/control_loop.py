@@ -1,4 +1,4 @@
-"""Plant and controller of a table in time: ticks in which nothing comes from outside pass when somebody looks."""
+"""Plant and controller over time. Ticks without external events are computed only when the state is read."""
 
 from emulator.faults.schedule import FaultSchedule
 from emulator.table.drive_faults import faulty_step, is_faulty
@@ -7,13 +7,13 @@ from emulator.table.tick import TableConstants, TableState, run_undisturbed, ste
 
 
 class ControlLoop:
-    """Plant and controller, level with the table when they are looked at.
+    """Plant and controller. They are brought up to date when they are read.
 
     Args:
         constants: per tick.
         state: at the present tick.
-        load_torque_Nm: resists positive rotation.
-        run: passes undisturbed ticks; without it they are interpreted.
+        load_torque_Nm: opposes positive rotation.
+        run: computes undisturbed ticks; without it they are interpreted.
     """
 
     def __init__(
@@ -23,8 +23,8 @@ class ControlLoop:
         self._run = run
         self._past_state = state
         self._load_torque_Nm = load_torque_Nm
-        self._owed_ticks = 0  # by which the state is behind
-        self._resting = False  # the state repeats itself, so ticks cost nothing
+        self._owed_ticks = 0  # number of ticks that the state is behind
+        self._resting = False  # the state repeats itself, so ticks need no computation
 
     @property
     def state(self) -> TableState:
@@ -38,29 +38,29 @@ class ControlLoop:
 
     @property
     def load_torque_Nm(self) -> float:
-        """The torque that resists positive rotation."""
+        """The torque that opposes positive rotation."""
         return self._load_torque_Nm
 
     @load_torque_Nm.setter
     def load_torque_Nm(self, torque_Nm: float) -> None:
-        self.catch_up()  # under the old torque; a new one may end a rest
+        self.catch_up()  # ticks under the old torque; a new torque may end a rest
         self._load_torque_Nm, self._resting = torque_Nm, False
 
     def pass_ticks(self, ticks: int) -> None:
-        """Let ticks pass in which nothing comes from outside."""
+        """Advance by ticks without external events."""
         self._owed_ticks += ticks
 
     def catch_up(self) -> None:
-        """Let the ticks pass that the state is behind."""
+        """Compute the ticks that the state is behind."""
         if self._owed_ticks and not self._resting:
             run = self._run or run_undisturbed
             state, resting = run(self.constants, self._past_state, self._load_torque_Nm, self._owed_ticks)
-            # In one statement without a call: Ctrl-C comes before it, and all is still owed, or after it.
+            # One statement without a call: Ctrl-C occurs before it, and all ticks are still due, or after it.
             self._past_state, self._resting, self._owed_ticks = state, resting, 0
         self._owed_ticks = 0
 
     def step(self, faults: FaultSchedule, supply_V: float) -> None:
-        """Take the state one tick on, in whatever state a fault has left the drive."""
+        """Advance the state by one tick, also with a faulty drive."""
         if is_faulty(faults):
             self.constants, self.state = faulty_step(faults, self.constants, self.state, self._load_torque_Nm, supply_V)
         else:

@@ -1,4 +1,4 @@
-"""What faults do to the drive and to the encoder: the tick of a table that is not sound."""
+"""The effect of faults on the drive and the encoder: the tick of a faulty table."""
 
 import math
 
@@ -25,20 +25,23 @@ from protocol.bench import Fault
 DRIVE_KINDS: frozenset[type[Fault]] = frozenset(
     (Stall, ExtraLoad, SupplySag, StuckPwm, OneSided, LostCounts, SwappedEncoder, DeadEncoder)
 )
-"""The faults that this module gives their effect."""
+"""The faults that this module implements."""
 _HELD_OVER_STALL = 4.0
-"""What holds a stalled table, over the motor's own stall torque."""
+"""The torque that blocks a stalled table; it exceeds the motor's own stall torque."""
 
 
 def is_faulty(faults: FaultSchedule) -> bool:
-    """Return whether a tick of plant and controller is another than that of a sound table."""
+    """Return whether a tick of plant and controller differs from that of a healthy table."""
     return faults.holds_any(DRIVE_KINDS)
 
 
 def faulty_step(
     faults: FaultSchedule, constants: TableConstants, state: TableState, load_torque_Nm: float, supply_V: float
 ) -> tuple[TableConstants, TableState]:
-    """Return the table one tick later, as `tick.step` does; what the encoder missed stays missed, in its phase."""
+    """Return the table one tick later, as `tick.step` does.
+
+    Missed counts stay missed: they shift the encoder's phase.
+    """
     drive = _drive_step(faults, constants, state, load_torque_Nm, supply_V)
     before = state.firmware.counts[-1]
     turned = wrap_int32(count_at(constants.encoder, drive.angle_rad) - before)
@@ -69,7 +72,7 @@ def _drive_step(
 
 
 def _counted(faults: FaultSchedule, turned: int) -> int:
-    """Return how many counts the counter moves by when the shaft has turned by so many."""
+    """Return the change of the counter for a rotation of the shaft by the given counts."""
     if faults.holding(DeadEncoder):
         return 0
     if lost := faults.holding(LostCounts):

@@ -1,8 +1,8 @@
-"""Long stretches of undisturbed ticks at machine speed, where numba is installed.
+"""Long runs of undisturbed ticks at machine speed, if numba is installed.
 
-A compiled tick takes a hundredth of an interpreted one, but numba has to be imported first (about half a second), and
-the code compiled (some seconds) where no earlier run has left it. Ticks are interpreted until they have cost about as
-much, so that no session takes more than twice the time of the better choice.
+A compiled tick takes a hundredth of the time of an interpreted one. But numba has to be imported first, which takes
+about half a second. The code has to be compiled too (some seconds) if no earlier run has stored it. Ticks are
+interpreted until they have cost about as much. So no session takes more than twice the time of the better choice.
 """
 
 import sys
@@ -16,30 +16,30 @@ from protocol.interrupts import signals_wait
 from protocol.kept_code import is_kept
 
 Run = Callable[[TableConstants, TableState, float, int], tuple[TableState, bool]]
-"""What passes undisturbed ticks; see `tick.run_undisturbed`."""
+"""Computes undisturbed ticks; see `tick.run_undisturbed`."""
 
 SHORT_TICKS: Final = 6
-"""Fewer are interpreted: a compiled call takes as long as some interpreted ticks."""
+"""Fewer ticks are interpreted: a compiled call takes as long as some interpreted ticks."""
 
 LOADED_TICKS: Final = 10_000
-"""Interpreted ticks that cost as much as the first compiled one, with numba imported and machine code kept."""
+"""Number of interpreted ticks that take as long as the first compiled one, with numba imported and code stored."""
 
 KEPT_TICKS: Final = 150_000
-"""The same with machine code kept from an earlier run, and numba still to be imported."""
+"""The same if machine code is stored from an earlier run, and numba is not yet imported."""
 
 NEW_TICKS: Final = 1_000_000
-"""The same without any machine code."""
+"""The same without stored machine code."""
 
 _PIECE_TICKS = 1000
 _LONGEST_CALL_TICKS = 10_000_000
-"""For so many ticks, a third of a second, Ctrl-C may wait."""
+"""Number of ticks per call, a third of a second, during which Ctrl-C has to wait."""
 
 
 class FastTicks:
-    """`tick.run_undisturbed`, to the last bit, interpreted at first and compiled once that pays.
+    """`tick.run_undisturbed`, bit-identical, interpreted at first and compiled when that is faster.
 
     Attributes:
-        warm_up_ticks: how many are interpreted at first; None until it is known how many are best here.
+        warm_up_ticks: number of ticks interpreted at first; None until the best number is known.
     """
 
     def __init__(self, warm_up_ticks: int | None = None) -> None:
@@ -51,13 +51,13 @@ class FastTicks:
 
     @property
     def is_compiled(self) -> bool:
-        """Whether long stretches run compiled from now on."""
+        """Whether long runs are compiled from now on."""
         return self._compiled is not None
 
     def __call__(
         self, constants: TableConstants, state: TableState, load_torque_Nm: float, ticks: int
     ) -> tuple[TableState, bool]:
-        """Return the table after ticks in which nothing comes from outside, and whether it rests."""
+        """Return the table after ticks without external events, and whether it rests."""
         resting = False
         while ticks > 0 and not resting:
             if ticks < SHORT_TICKS or not self._pays():
@@ -67,15 +67,15 @@ class FastTicks:
             else:
                 assert self._compiled is not None
                 some = min(ticks, _LONGEST_CALL_TICKS)
-                kind = len(state.firmware.counts)  # what the types of constants and state depend on
-                with nullcontext() if kind in self._loaded else signals_wait():  # numba must not be broken into
+                kind = len(state.firmware.counts)  # arguments that determine the types of constants and state
+                with nullcontext() if kind in self._loaded else signals_wait():  # numba must not be interrupted
                     state, resting = self._compiled(constants, state, load_torque_Nm, some)
                 self._loaded.add(kind)
             ticks -= some
         return state, resting
 
     def _pays(self) -> bool:
-        """Return whether there is, or should now be, compiled code."""
+        """Return whether compiled code exists, or should exist now."""
         if self._compiled is not None:
             return True
         if self._is_hopeless or (self._interpreted_ticks < LOADED_TICKS and self.warm_up_ticks is None):
@@ -87,9 +87,9 @@ class FastTicks:
         if self._interpreted_ticks < self.warm_up_ticks:
             return False
         try:
-            from emulator.table.machine_code import compiled  # noqa: PLC0415  # numba is imported only when that pays
+            from emulator.table.machine_code import compiled  # noqa: PLC0415  # numba is imported only when that is faster
 
             self._compiled = compiled(run_undisturbed)
-        except (ImportError, OSError, RuntimeError):  # numba is broken, or has no folder that it can write
+        except (ImportError, OSError, RuntimeError):  # numba is broken, or has no writable folder
             self._is_hopeless = True
         return self._compiled is not None

@@ -1,4 +1,4 @@
-"""The command interpreter: what each verb of Table 1 does to the controller, and what it answers."""
+"""The command interpreter: the effect of each verb of Table 1 on the controller, and its reply."""
 
 from collections.abc import Callable
 from decimal import Decimal
@@ -15,7 +15,7 @@ from protocol.messages import Angle, Command, ErrorCode, Ok, Refusal, Reply, Ver
 
 
 class Registers(NamedTuple):
-    """What waits for the next motion command, and the latch."""
+    """The settings for the next motion command, and the latch."""
 
     speed: int  # count/tick, the table's motion bits
     acceleration: int  # count/tick^2, the table's motion bits
@@ -23,14 +23,14 @@ class Registers(NamedTuple):
 
 
 Outcome = tuple[Reply, FirmwareState, Registers]
-"""The reply to a command, and controller and registers after it."""
+"""The reply to a command, and controller and registers after the command."""
 
 
 class Interpreter:
-    """Carries out commands on a controller's state; it has no state of its own."""
+    """Executes commands on a controller's state. It has no state itself."""
 
     def __init__(self, config: TableConfig) -> None:
-        """Take the units and limits of a configured table."""
+        """Store the units and limits of a configured table."""
         limits, power_on = config.limits, config.power_on
         # As they are written in the file: the nearest float of 33.3 is below it, and would refuse `S 33.3`.
         self._speed_limit = simplest_fraction(limits.speed_deg_s)
@@ -40,11 +40,11 @@ class Interpreter:
         self._count_deg = config.counts_per_turn / 360
         self._bits = config.motion_bits
         self._last_position = INT32_MAX << self._bits
-        self._half_range = (INT32_MAX + 1) << self._bits  # the longest motion; and, below 0, the first position
+        self._half_range = (INT32_MAX + 1) << self._bits  # the longest motion; and, negated, the first position
         self._tick_hz = config.control.tick_hz
 
     def power_on(self) -> Registers:
-        """Return the registers as the controller wakes; the latch holds the position at power-on."""
+        """Return the registers at power-on; the latch holds the position at power-on."""
         return Registers(self._speed(self._first_speed), self._acceleration(self._first_acceleration), 0)
 
     def angle_deg(self, count: int) -> Decimal:
@@ -53,9 +53,9 @@ class Interpreter:
         return Decimal(angle.numerator) / angle.denominator
 
     def execute(self, command: Command, controller: FirmwareState, registers: Registers) -> Outcome:
-        """Return the reply, and controller and registers after the command; a refused one changes nothing.
+        """Return the reply, and controller and registers after the command. A refused command changes nothing.
 
-        A verb that `CARRIED_OUT` does not have is refused as unknown.
+        A verb without an entry in `CARRIED_OUT` is refused as unknown.
         """
         if command.verb not in CARRIED_OUT:
             return Refusal(ErrorCode.UNKNOWN_COMMAND), controller, registers
@@ -70,18 +70,18 @@ class Interpreter:
         return Angle(command.verb, self.angle_deg(registers.latched_count)), controller, registers
 
     def move_to(self, command: Command, controller: FirmwareState, registers: Registers) -> Outcome:
-        """P: begin a motion to a position that the counter can hold."""
+        """P: start a motion to a position within the range of the counter."""
         target = to_fixed(_value(command) * self._count_deg, self._bits)
         if not -self._half_range <= target <= self._last_position:
             return Refusal(ErrorCode.OUT_OF_RANGE), controller, registers
         return self._move(distance_to(controller.reference, target, self._bits), controller, registers)
 
     def move_by(self, command: Command, controller: FirmwareState, registers: Registers) -> Outcome:
-        """R: begin a motion by an increment."""
+        """R: start a motion by an increment."""
         return self._move(to_fixed(_value(command) * self._count_deg, self._bits), controller, registers)
 
     def set_speed(self, command: Command, controller: FirmwareState, registers: Registers) -> Outcome:
-        """S: the top speed of the next motion."""
+        """S: the maximum speed of the next motion."""
         value = _value(command)
         speed = self._speed(value)
         if speed < 1 or value > self._speed_limit:
@@ -110,7 +110,7 @@ class Interpreter:
 
 
 def _value(command: Command) -> Fraction:
-    assert command.value is not None, command  # the codec gives a verb its number where it takes one
+    assert command.value is not None, command  # the codec gives a number to each verb that takes one
     return Fraction(command.value)
 
 
@@ -122,4 +122,4 @@ CARRIED_OUT: dict[Verb, Callable[[Interpreter, Command, FirmwareState, Registers
     Verb.SET_SPEED: Interpreter.set_speed,
     Verb.SET_ACCELERATION: Interpreter.set_acceleration,
 }
-"""What the table does on each verb; a test keeps it complete."""
+"""The action of each verb; a test checks that all verbs are present."""

@@ -1,7 +1,7 @@
-"""Let numba compile the tick where a compiled function calls it.
+"""Make numba compile the tick when a compiled function calls it.
 
-The compiled functions are those that the emulator interprets, so states agree to the last bit; tests hold them to it.
-This module needs numba, the emulator does not.
+The compiled functions are those that the emulator interprets, so the states are bit-identical; tests check this. This
+module needs numba, the emulator does not.
 """
 
 from types import FunctionType
@@ -17,7 +17,7 @@ __all__ = ["compiled", "inlined"]
 _MODULES = (int32, fixed_point, friction, drive_train, encoder, profiler, pid, controller, tick)
 
 
-# Inlined, the state stays in registers: that alone makes a tick four times as fast.
+# The functions are inlined, so that the state stays in registers: this makes a tick four times as fast.
 for _module in _MODULES:
     for _function in list(vars(_module).values()):
         if isinstance(_function, FunctionType) and _function.__module__ == _module.__name__:

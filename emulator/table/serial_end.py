@@ -1,7 +1,7 @@
-"""The controller's end of the serial line: the client's bytes are cut into lines, and replies go back as bytes.
+"""The controller's end of the serial line: it splits the client's bytes into lines, and sends replies as bytes.
 
-With a baud rate each byte takes its time on the line, both ways. At 0 there is no line to wait for: a command is
-answered in the call that brings it.
+With a baud rate, each byte takes its transmission time in both directions. At 0 there is no delay: a command is
+answered within the call that sends it.
 """
 
 from collections.abc import Iterator
@@ -17,14 +17,17 @@ _LONGEST_REPLY = LINE_LIMIT + 1
 _LINE_END = 0x0D
 
 Lines = Iterator[bytes | ErrorCode]
-"""What the firmware has read, as `LineBuffer` gives it. The reply to each is written before the next one is taken."""
+"""A line that the firmware has read, as `LineBuffer` returns it.
+
+The reply to each line is written before the next one is read.
+"""
 
 
 class SerialEnd:
     """UART, line buffer and the faults of the line, between a client's bytes and the firmware's lines.
 
     Attributes:
-        uart: the paced line; idle for ever without pacing.
+        uart: the paced line; always idle without pacing.
     """
 
     def __init__(self, config: TableConfig, faults: FaultSchedule) -> None:
@@ -34,10 +37,10 @@ class SerialEnd:
         self._lines = LineBuffer()
         self._faults = LineFaults(config.serial.baud, config.control.tick_hz, faults)
         self._sent = b""
-        self._heard = self._said = b""  # since it was last overheard
+        self._heard = self._said = b""  # since it was last observed
 
     def receive(self, data: bytes) -> Lines:
-        """Take bytes that the client puts on the line now; yield what the firmware has read with this."""
+        """Take bytes that the client sends now; yield the lines that the firmware has now read."""
         data = self._faults.on_the_line(data, TO_TABLE)
         if self._paced:
             self.uart.receive(data)
@@ -45,12 +48,12 @@ class SerialEnd:
             yield from self._read(data)
 
     def transmit(self) -> bytes:
-        """Return the bytes that have left by now, and forget them."""
+        """Return and remove the bytes that have been sent by now."""
         sent, self._sent = self._sent, b""
         return sent
 
     def advance(self) -> Lines:
-        """Let a tick pass on the line; yield what the firmware reads, as long as it has room for a reply."""
+        """Advance the line by one tick; yield the lines that the firmware reads, as long as it has room for a reply."""
         uart = self.uart
         uart.advance()
         while uart.readable and uart.transmit_room >= _LONGEST_REPLY:
@@ -64,20 +67,20 @@ class SerialEnd:
 
     @property
     def needs_each_tick(self) -> bool:
-        """Whether something can happen on the line that is not the end of a line."""
+        """Whether an event other than the end of a line is possible on the serial line."""
         uart = self.uart
         if uart.idle:
             return False
         return self._faults.are_present or not uart.is_read_at_once or uart.transmit_room < _LONGEST_REPLY
 
     def ticks_until_line(self) -> int | None:
-        """Return the ticks until the firmware has a whole line; None while none is on its way."""
+        """Return the ticks until the firmware has a complete line; None if none is in transmission."""
         return self.uart.ticks_until_received(_LINE_END)
 
     def pass_ticks(self, ticks: int) -> Lines:
-        """Let ticks pass, as so many calls of `advance` do.
+        """Advance by some ticks, as the same number of calls of `advance` would.
 
-        The line does not need each of them, and no whole line comes before the last one.
+        The line needs no single ticks, and no line is complete before the last one.
         """
         if self.uart.idle:
             return
@@ -88,9 +91,9 @@ class SerialEnd:
             yield from self._pass_quietly(ticks)
 
     def ticks_until_sent(self, wanted: int, tick: int) -> int | None:
-        """Return the ticks until `wanted` bytes may have left, or a line comes that may bring them; None if none does.
+        """Return the ticks until `wanted` bytes may have been sent, or a line is complete; None if neither occurs.
 
-        Every byte is stopped at where faults may change it.
+        If faults may change bytes, it stops at every byte.
         """
         if self.needs_each_tick or self.held_until is not None:
             return self.ticks_until_byte(tick)
@@ -100,21 +103,21 @@ class SerialEnd:
         return self.ticks_until_byte(tick) if line is None else line
 
     def write(self, reply: bytes, tick: int) -> None:
-        """Give a reply to the line."""
+        """Pass a reply to the line."""
         self._put(self._faults.on_a_reply(reply, tick))
 
     @property
     def held_until(self) -> int | None:
-        """The tick at which replies that a fault holds back go on; None where there are none."""
+        """The tick at which replies that a fault delays are sent; None if there are none."""
         return self._faults.held_until
 
     def release(self, tick: int) -> None:
-        """Let replies go on that were held back until now."""
+        """Send the delayed replies that are due now."""
         if held := self._faults.released(tick):
             self._put(held)
 
     def ticks_until_byte(self, tick: int) -> int | None:
-        """Return the ticks until the next byte in either direction is over; None while the line is idle."""
+        """Return the ticks until the next byte in either direction is complete; None while the line is idle."""
         ticks, held_until = self.uart.ticks_until_byte(), self._faults.held_until
         if held_until is None:
             return ticks
@@ -122,14 +125,14 @@ class SerialEnd:
         return held if ticks is None else min(ticks, held)
 
     def disconnect(self) -> None:
-        """Forget the client's half line and the replies that it has not got: it has gone."""
+        """Discard the client's incomplete line and the replies that it has not received: it has disconnected."""
         self.uart.disconnect()
         self._faults.disconnect()
         self._lines.discard()
         self._sent = b""
 
     def overheard(self) -> tuple[bytes, bytes]:
-        """Return what the firmware has read and what has left since the last call, and forget it."""
+        """Return and clear what the firmware has read and what has been sent since the last call."""
         heard, said, self._heard, self._said = self._heard, self._said, b"", b""
         return heard, said
 

@@ -1,4 +1,4 @@
-"""What can be seen of a table beside the wire, from its configuration and its state."""
+"""The observable state of a table on the bench, from its configuration and its state."""
 
 import math
 
@@ -13,7 +13,7 @@ from protocol.bench import TableFacts, TableStatus
 
 
 def table_facts(config: TableConfig) -> TableFacts:
-    """Return the constants that clients may rely on."""
+    """Return the constants that clients may use."""
     limits = config.limits
     return TableFacts(config.control.tick_hz, config.counts_per_deg, limits.speed_deg_s, limits.acceleration_deg_s2)
 
@@ -29,11 +29,11 @@ def table_status(
     load_torque_Nm: float,
     true_zero_rad: float,
 ) -> TableStatus:
-    """Return what plant, controller and line say; the true angle counts from `true_zero_rad`."""
+    """Return the state of plant, controller and line; the true angle counts from `true_zero_rad`."""
     drive, controller, _ = state
     reference, regulator = controller.reference, controller.pid
     count_deg = config.counts_per_deg
-    speed_deg_s = config.control.tick_hz / count_deg  # of one count a tick
+    speed_deg_s = config.control.tick_hz / count_deg  # speed of one count per tick
     return TableStatus(
         tick=tick,
         reference_deg=(reference.position_count + from_fixed(reference.fraction, config.motion_bits)) / count_deg,
@@ -51,7 +51,7 @@ def table_status(
         transmit_queue=uart.transmit_count,
         lost_bytes=uart.lost_bytes,
         load_torque_Nm=load_torque_Nm,
-        # A count stands for all angles from its edge to the next, so that its middle is what it means.
+        # A count represents all angles from its edge to the next one, so its value is the middle.
         shaft_deg=(drive.angle_rad * encoder.count_rad + encoder.phase - 0.5) / count_deg,
         gap_deg=math.degrees(drive.angle_rad / config.gears.ratio - drive.table_angle_rad),
     )

@@ -30,7 +30,7 @@ _EFFECTIVE_FAULTS = LINE_KINDS | PORT_KINDS | DRIVE_KINDS | TRIGGER_KINDS
 
 
 class Snapshot(NamedTuple):
-    """Everything that a table's future depends on, apart from its configuration."""
+    """Everything that determines the future of a table, except its configuration."""
 
     tick: int
     constants: TableConstants
@@ -44,16 +44,16 @@ class Snapshot(NamedTuple):
 
 
 class Table:
-    """A rotary table: firmware and plant behind a serial line, in simulated time.
+    """A rotary table: firmware and plant with a serial line, in simulated time.
 
-    The same configuration, seed, bytes and ticks give the same bytes and the same states to the last bit. The seed
-    says where the shaft stands between two encoder edges, and the teeth in the backlash, at power-on.
+    The same configuration, seed, bytes and ticks give the same bytes and bit-identical states. The seed determines the
+    position of the shaft between two encoder edges, and of the teeth in the backlash, at power-on.
 
     Attributes:
         config: the table's constants.
-        facts: those that its clients may rely on.
-        tick: ticks since it was switched on.
-        observer: who sees every tick, if anybody.
+        facts: the constants that its clients may use.
+        tick: ticks since power-on.
+        observer: called after every tick, if set.
     """
 
     def __init__(self, config: TableConfig, seed: int = 0, run: Run | None = None) -> None:
@@ -61,10 +61,10 @@ class Table:
 
         Args:
             config: the table's constants.
-            seed: places shaft and gear teeth.
-            run: passes undisturbed ticks, once the state is asked for. Without it they pass at once, interpreted.
+            seed: determines the positions of shaft and gear teeth.
+            run: computes undisturbed ticks when the state is read. Without it, they are interpreted at once.
         """
-        chance = random.Random(seed)  # noqa: S311  # where a gear stands is no secret
+        chance = random.Random(seed)  # noqa: S311  # not for security
         tick_hz = config.control.tick_hz
         self.config = config
         self.facts = table_facts(config)
@@ -82,35 +82,35 @@ class Table:
         self._triggers = TriggerInput(tick_hz, self._faults)
 
     def receive(self, data: bytes) -> None:
-        """Take bytes that the client puts on the line now."""
+        """Take bytes that the client sends now."""
         self._carry_out(self._serial.receive(data))
         if self.observer is None:
-            self._serial.overheard()  # and forgotten: nobody watches
+            self._serial.overheard()  # discarded without an observer
 
     def transmit(self) -> bytes:
-        """Return the bytes that have left by now, and forget them."""
+        """Return and remove the bytes that have been sent by now."""
         return self._serial.transmit()
 
     def ticks_until_byte(self) -> int | None:
-        """Return the ticks until the next byte in either direction is over; None while the line is idle."""
+        """Return the ticks until the next byte in either direction is complete; None while the line is idle."""
         return self._serial.ticks_until_byte(self.tick)
 
     def disconnect(self) -> None:
-        """Let the client go: its half line and its unsent replies are forgotten, its motion goes on."""
+        """Disconnect the client: its incomplete line and its unsent replies are discarded, its motion continues."""
         self._serial.disconnect()
 
     @property
     def hung_up(self) -> bool:
-        """Whether a fault has taken the port away."""
+        """Whether a fault has removed the port."""
         return self._faults.hangs_up
 
     def inject(self, fault: Fault) -> None:
-        """Let something go wrong, now or when the fault says."""
+        """Inject a fault, now or at the time that the fault specifies."""
         if self._faults.inject(fault, self.tick):
             self.disconnect()
 
     def clear_faults(self) -> None:
-        """End all faults, and forget those to come; replies that are late are still to come."""
+        """End all faults and cancel the scheduled ones. Delayed replies are still sent later."""
         self._faults.clear()
 
     @property
@@ -123,7 +123,10 @@ class Table:
         self._triggers.start_train(rate_hz, self.tick)
 
     def trigger(self, fraction: float = 0.0) -> None:
-        """Put an edge on the trigger input, at a fraction (0..1) of the coming tick; the latch follows it."""
+        """Apply an edge to the trigger input at a fraction (0..1) of the coming tick.
+
+        The latch stores the position of that instant.
+        """
         if not 0.0 <= fraction < 1.0:
             raise ValueError(f"an edge at {fraction} of a tick is outside 0..1")
         if fraction == 0.0:
@@ -132,13 +135,13 @@ class Table:
             self._triggers.add_edge(self.tick, fraction)
 
     def set_load_torque(self, torque_Nm: float) -> None:
-        """Load the table with a torque that resists positive rotation, until it is set anew."""
+        """Apply a load torque that opposes positive rotation, until the next call."""
         if not math.isfinite(torque_Nm):
             raise ValueError(f"a load torque of {torque_Nm} Nm is not finite")
         self._loop.load_torque_Nm = float(torque_Nm)
 
     def reset(self, count: int = 0) -> None:
-        """Switch the table off and on: the controller wakes at `count` where the plant is; the plant goes on."""
+        """Switch the table off and on. The controller starts at `count`, and the plant continues."""
         loop, drive = self._loop, self._loop.state.drive
         encoder = loop.constants.encoder
         loop.constants = loop.constants._replace(encoder=recounted(encoder, drive.angle_rad, count))
@@ -154,20 +157,20 @@ class Table:
 
     @property
     def received_queue(self) -> int:
-        """Bytes on their way to the firmware."""
+        """Number of bytes in transmission to the firmware."""
         return self._serial.uart.waiting_count
 
     @property
     def outgoing(self) -> bytes:
-        """Bytes of replies that have not left yet."""
+        """Number of bytes of replies that have not been sent yet."""
         return self._serial.uart.outgoing
 
     def ticks_until_sent(self, wanted: int) -> int | None:
-        """Return the ticks until `wanted` bytes may have left, or a line comes that may bring them; None if neither."""
+        """Return the ticks until `wanted` bytes may have been sent, or a line is complete; None if neither occurs."""
         return self._serial.ticks_until_sent(wanted, self.tick)
 
     def status(self) -> TableStatus:
-        """Return what can be seen of the table now."""
+        """Return the present state of the table."""
         return table_status(
             self.config,
             self._loop.state,
@@ -180,7 +183,7 @@ class Table:
         )
 
     def snapshot(self) -> Snapshot:
-        """Return a copy of everything that the table's future depends on."""
+        """Return a copy of everything that determines the future of the table."""
         return copy.deepcopy(
             Snapshot(
                 self.tick,
@@ -196,7 +199,7 @@ class Table:
         )
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot of a table with this configuration."""
+        """Restore a snapshot of a table with this configuration."""
         (
             self.tick,
             constants,
@@ -211,7 +214,7 @@ class Table:
         self._loop = ControlLoop(constants, state, load_torque_Nm, self._run)
 
     def advance(self, ticks: int) -> None:
-        """Let simulated time pass."""
+        """Advance the simulated time."""
         if ticks < 0:
             raise ValueError(f"time cannot go back by {-ticks} ticks")
         end = self.tick + ticks
@@ -226,13 +229,13 @@ class Table:
             self._loop.catch_up()
 
     def _is_busy(self) -> bool:
-        """Return whether each tick needs a look: at the line, by the observer, or for a drive that is not sound."""
+        """Return whether each tick must be computed separately: for the line, the observer, or a faulty drive."""
         return self._serial.needs_each_tick or self.observer is not None or is_faulty(self._faults)
 
     def _next_event(self, end: int) -> int:
-        """Return the tick, `end` at the latest, at which something comes from outside.
+        """Return the tick, at most `end`, of the next external event.
 
-        That is an edge, a whole line, or a fault that begins, ends or lets a reply go.
+        That is an edge, a complete line, or a fault that starts, ends or releases a reply.
         """
         line = self._serial.ticks_until_line()
         line_tick = None if line is None else self.tick + line
@@ -240,15 +243,15 @@ class Table:
         return min([end, *(tick for tick in events if tick is not None)])
 
     def _advance_undisturbed(self, end: int) -> None:
-        """Pass ticks in which nothing comes from outside; a state that repeats itself stays to the end."""
+        """Advance by ticks without external events. A state that repeats itself stays to the end."""
         ticks = end - self.tick
         self._loop.pass_ticks(ticks)
         self.tick = end
         self._carry_out(self._serial.pass_ticks(ticks))
-        self._serial.overheard()  # and forgotten: nobody watches
+        self._serial.overheard()  # discarded without an observer
 
     def _advance_watched(self) -> None:
-        """Pass one tick in which the line, an edge, a fault or the observer has its turn."""
+        """Advance by one tick with the line, an edge, a fault or the observer."""
         self._serve_faults()
         loop, before = self._loop, self._loop.state.drive
         loop.step(self._faults, self.config.driver.supply_V)
@@ -263,31 +266,31 @@ class Table:
             self.observer(self.status(), heard, said)
 
     def _serve_faults(self) -> None:
-        """Let faults begin and end, and replies go on that were held back."""
+        """Start and end faults, and send delayed replies that are due."""
         if self._faults.begin_tick(self.tick):
             self.disconnect()
         self._serial.release(self.tick)
 
     def _see_edge(self, angle_rad: float) -> None:
-        """Latch the position at an edge of the trigger, unless a fault hides the edge."""
+        """Latch the position at a trigger edge, unless a fault hides the edge."""
         if self._triggers.sees_edge(self.tick):
             latched_count = count_at(self._loop.constants.encoder, angle_rad)
             self._registers = self._registers._replace(latched_count=latched_count)
 
     def _carry_out(self, lines: Iterable[bytes | ErrorCode]) -> None:
-        """Answer lines that the firmware has read, each before the next one is read."""
+        """Reply to lines that the firmware has read, to each one before the next one is read."""
         for line in lines:
             if reply := self._answer(line):
                 self._serial.write(reply, self.tick)
 
     def _answer(self, line: bytes | ErrorCode) -> bytes:
-        """Carry out a line that the firmware has read, once the faults that wait for it have begun."""
+        """Execute a line that the firmware has read, after the start of the faults that wait for it."""
         if self._faults.begin_line(self.tick):
             self.disconnect()
         return self._reply(line if isinstance(line, ErrorCode) else decode_command(line))
 
     def _reply(self, command: Command | ErrorCode) -> bytes:
-        """Carry out a command and return its reply; in strict Table 1 mode a refused line has none."""
+        """Execute a command and return its reply. In strict Table 1 mode, a refused line has no reply."""
         if isinstance(command, Command):
             state = self._loop.state
             reply, controller, self._registers = self._interpreter.execute(command, state.firmware, self._registers)

@@ -1,8 +1,8 @@
-"""One tick of the whole table: voltage to motion to counts to the next voltage.
+"""One tick of the whole table: from voltage to motion to counts to the next voltage.
 
-A pure function of constants, state and inputs, in the part of Python that numba compiles: the emulator runs it
-interpreted, `batch` compiled, with the same results to the last bit. The new duty waits in the PWM's buffer for one
-tick, as the controller computes while the old one is on the bridge.
+A pure function of constants, state and inputs, in the subset of Python that numba compiles. The emulator interprets it,
+and `batch` compiles it, with bit-identical results. The new duty waits in the PWM's buffer for one tick, because the
+controller computes while the old duty is applied.
 """
 
 from typing import NamedTuple
@@ -31,7 +31,7 @@ class TableState(NamedTuple):
 
     drive: DriveState
     firmware: FirmwareState
-    duty: int  # on the bridge in the coming tick, PWM steps
+    duty: int  # applied in the coming tick, PWM steps
 
 
 def table_constants(config: TableConfig, encoder_phase: float) -> TableConstants:
@@ -45,7 +45,10 @@ def table_constants(config: TableConfig, encoder_phase: float) -> TableConstants
 
 
 def woken(constants: TableConstants, drive: DriveState, profile: Profile) -> TableState:
-    """Return the table as its controller wakes where the plant is; `profile` holds until the first motion command."""
+    """Return the table at power-on of its controller.
+
+    The plant stays as it is, and `profile` applies until the first motion command.
+    """
     count = count_at(constants.encoder, drive.angle_rad)
     return TableState(drive, power_on(constants.firmware, profile, count), 0)
 
@@ -59,9 +62,10 @@ def step(constants: TableConstants, state: TableState, load_torque_Nm: float) ->
 def run_undisturbed(
     constants: TableConstants, state: TableState, load_torque_Nm: float, ticks: int
 ) -> tuple[TableState, bool]:
-    """Return the table after ticks in which nothing comes from outside, and whether it rests.
+    """Return the table after ticks without external events, and whether it rests.
 
-    A resting state is one whose step returns itself: it stays for ever, and the ticks that are left cost nothing.
+    A resting state is one whose step returns itself: it does not change any more, and the remaining ticks need no
+    computation.
     """
     drive, controller, duty = state
     for _ in range(ticks):
@@ -75,7 +79,7 @@ def run_undisturbed(
 def _step(
     constants: TableConstants, drive: DriveState, controller: FirmwareState, duty: int, load_torque_Nm: float
 ) -> tuple[DriveState, FirmwareState, int]:
-    """Return the fields of the state one tick later; a `TableState` is made only of those that somebody sees."""
+    """Return the fields of the state one tick later. A `TableState` is created only when it is read."""
     train, shaft_encoder, controller_constants, volts_per_duty = constants
     drive = drive_step(train, drive, duty * volts_per_duty, load_torque_Nm)
     count = count_at(shaft_encoder, drive.angle_rad)

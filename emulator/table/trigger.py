@@ -1,6 +1,6 @@
-"""The trigger input, on which the laser probe tells the controller to latch the table's position.
+"""The trigger input, at which the laser probe makes the controller latch the table's position.
 
-An edge may come at any instant: its time is a tick and a fraction of it.
+An edge may occur at any instant: its time is a tick and a fraction of it.
 """
 
 import math
@@ -11,10 +11,10 @@ from emulator.faults.trigger_faults import TriggerFaults
 
 
 class TriggerInput:
-    """The edges to come: single ones, and a periodic train."""
+    """The scheduled edges: single ones, and a periodic train."""
 
     def __init__(self, tick_hz: int, faults: FaultSchedule) -> None:
-        """Start with a silent input."""
+        """Start with an input without edges."""
         self._tick_hz = tick_hz
         self._faults = TriggerFaults(tick_hz, faults)
         self._rate_hz = 0.0
@@ -24,31 +24,31 @@ class TriggerInput:
 
     @property
     def rate_hz(self) -> float:
-        """The rate of the periodic train; 0 where there is none."""
+        """The rate of the periodic train; 0 without a train."""
         return self._rate_hz
 
     def start_train(self, rate_hz: float, tick: int) -> None:
-        """Begin a periodic train whose first edge comes one period after `tick`; a rate of 0 ends it.
+        """Start a periodic train whose first edge occurs one period after `tick`; a rate of 0 ends it.
 
         Raises:
-            ValueError: The rate is negative, or beyond one edge a tick.
+            ValueError: the rate is negative, or exceeds one edge per tick.
         """
         if not 0.0 <= rate_hz <= self._tick_hz:
             raise ValueError(f"a trigger rate of {rate_hz} Hz is outside 0..{self._tick_hz} Hz")
         self._rate_hz, self._origin_tick, self._periods = rate_hz, tick, 1
 
     def add_edge(self, tick: int, fraction: float) -> None:
-        """Add a single edge, at a fraction (0..1) of the tick that begins at `tick`."""
+        """Add a single edge, at a fraction (0..1) of the tick that starts at `tick`."""
         heappush(self._single, (tick, fraction))
 
     @property
     def next_tick(self) -> int | None:
-        """The tick in which the next edge comes; None where no edge is to come."""
+        """The tick of the next edge; None if no edge is scheduled."""
         edge = min(self._upcoming(), default=None)
         return None if edge is None else edge[0]
 
     def take(self, tick: int) -> float | None:
-        """Take the next edge if it comes before the end of the tick that begins at `tick`; return its fraction."""
+        """Remove the next edge if it occurs before the end of the tick that starts at `tick`; return its fraction."""
         upcoming = self._upcoming()
         if not upcoming:
             return None
@@ -62,7 +62,7 @@ class TriggerInput:
         return edge[1]
 
     def sees_edge(self, tick: int) -> bool:
-        """Return whether the controller sees an edge in this tick; where a fault makes it bounce, others follow it."""
+        """Return whether the controller detects an edge in this tick. If a fault makes it bounce, others follow it."""
         if self._faults.misses_edge():
             return False
         for edge in self._faults.bounces(tick):

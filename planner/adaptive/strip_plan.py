@@ -13,11 +13,11 @@ from planner.execution.table_motion import TableMotion
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
 from planner.map.map_builder import build_maps
-from planner.planning.arm_check import PlannedArm, arm_fault
-from planner.planning.arm_motion import arm_motion
-from planner.planning.arm_on_path import arm_along
-from planner.planning.plan import NoPlan, Plan, Planner
-from planner.planning.problem import Problem
+from planner.plans.arm_check import PlannedArm, arm_fault
+from planner.plans.arm_motion import arm_motion
+from planner.plans.arm_on_path import arm_along
+from planner.plans.plan import NoPlan, Plan, Planner
+from planner.plans.problem import Problem
 
 # Where the arm cannot follow at the strip's own speed, it may be swept this much slower.
 _SLOWER = (1.0, 2.0, 4.0)

@@ -1,1 +1,1 @@
-"""What is scanned, where, and past what: the cell, its bodies, the workpiece, the scan path, and all clearances."""
+"""The cell: frames, bodies, obstacles, workpiece, scan path, and clearances."""

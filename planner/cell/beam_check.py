@@ -1,4 +1,7 @@
-"""Does the beam meet the part? What a path file gets wrong most often: a frame, a unit, or the beam's direction."""
+"""Check that the beam meets the part.
+
+Typical errors of a path file are a wrong frame, a wrong unit, or a wrong beam direction.
+"""
 
 from typing import NamedTuple
 
@@ -9,17 +12,17 @@ from planner.arrays import BoolArray, FloatArray
 from planner.cell.cell import Probe
 from planner.geometry.ray_casting import RayCaster
 
-# Rays over the laser line: it may pass over a hole in its middle.
+# Rays over the laser line: its middle may be over a hole.
 _RAYS = 31
 
 
 class BeamFaults(NamedTuple):
-    """What the laser line meets at each location of a path `(n,)`.
+    """The result for the laser line at each location of a path `(n,)`.
 
     Attributes:
-        away: No surface ahead, and the part behind.
-        misses: No surface at all.
-        beyond: A surface ahead, but none within the measuring range.
+        away: no surface ahead, and the part behind.
+        misses: no surface in either direction.
+        beyond: a surface ahead, but none within the measuring range.
     """
 
     away: BoolArray
@@ -28,7 +31,7 @@ class BeamFaults(NamedTuple):
 
 
 def beam_faults(T_WS: FloatArray, mesh: trimesh.Trimesh, probe: Probe) -> BeamFaults:
-    """Return what is wrong with the beam at each of the locations `(n, 4, 4)` of a path over a mesh in mm."""
+    """Return the faults of the beam at each location `(n, 4, 4)` of a path over a mesh in mm."""
     rays = RayCaster(mesh)
     along_mm = np.linspace(-0.5, 0.5, _RAYS) * probe.line_width_mm
     starts = T_WS[:, np.newaxis, :3, 3] + along_mm[:, np.newaxis] * T_WS[:, np.newaxis, :3, 0]
@@ -43,13 +46,13 @@ def beam_faults(T_WS: FloatArray, mesh: trimesh.Trimesh, probe: Probe) -> BeamFa
 
 
 def beam_warning(T_WS: FloatArray, mesh: trimesh.Trimesh, probe: Probe) -> str | None:
-    """Return one sentence that names the locations at which nothing can be measured, or None where there are none."""
+    """Return one sentence with the locations at which nothing can be measured, or None if there are none."""
     faults = beam_faults(T_WS, mesh, probe)
     ranged = f"meets the part outside the measuring range of {probe.nearest_mm:g} to {probe.farthest_mm:g} mm"
     found = [
         f"{what} at {_places(places)}"
         for what, places in (
-            ("looks away from the part", faults.away), ("misses the part", faults.misses), (ranged, faults.beyond),
+            ("points away from the part", faults.away), ("misses the part", faults.misses), (ranged, faults.beyond),
         )
         if places.any()
     ]  # fmt: skip

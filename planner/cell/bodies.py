@@ -1,4 +1,4 @@
-"""The bodies that move with the arm: its links as capsules, the probe's housing as a box, and the probe's beam."""
+"""The bodies that move with the arm: links as capsules, the probe's housing as a box, and the probe's beam."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -24,21 +24,22 @@ _ARM_PARTS = {
     "forearm": (3, 3),
     "wrist": (WRIST_LINK, FLANGE_FRAME),
 }
-"""Each part's link and frame; a file has one capsule or several for each."""
+"""Link and frame of each part; a file has one or several capsules for each."""
 _MOUNT_DEPTH = 0.75
-"""Where the mount meets the housing, in depths of the housing from the laser's exit."""
+"""Position at which the mount meets the housing, in depths of the housing from the laser's exit."""
 
 
 class Part(NamedTuple):
-    """A part of the arm or the probe's mount: a capsule that moves with one frame of the arm.
+    """A part of the arm or of the probe's mount: a capsule that moves with one frame of the arm.
 
     Attributes:
-        name: What reasons call it.
-        link: Its place in the chain of bodies; parts of one link and of neighboring links are not checked.
-        frame: The frame it moves with: 0 the base, 1 to 6 the one after each joint.
+        name: its name in reasons.
+        link: its place in the chain of bodies. Parts of one link or of neighboring links are not checked against each
+            other.
+        frame: the frame that it moves with: 0 the base, 1 to 6 the frame after each joint.
         start_mm: `(3,)`, one end of its segment in that frame.
         end_mm: `(3,)`, the other end.
-        radius_mm: The capsule's radius.
+        radius_mm: radius of the capsule.
     """
 
     name: str
@@ -50,12 +51,12 @@ class Part(NamedTuple):
 
 
 class Housing(NamedTuple):
-    """The probe's housing: a box that moves with the flange, the last in the chain of bodies.
+    """The probe's housing: a box that moves with the flange. It is the last link of the chain of bodies.
 
     Attributes:
-        name: What reasons call it.
-        link: Its place in the chain.
-        T_FH: `(4, 4)`, its middle and its axes in the flange's frame.
+        name: its name in reasons.
+        link: its place in the chain.
+        T_FH: `(4, 4)`, its middle and its axes in the frame of the flange.
         half_mm: `(3,)`, half its lengths along these axes.
     """
 
@@ -66,14 +67,14 @@ class Housing(NamedTuple):
 
 
 class Beam(NamedTuple):
-    """The probe's beam: a capsule from the probe's origin along its z axis to `gap_mm` before the surface."""
+    """The probe's beam: a capsule from the probe's origin along its z axis, which ends `gap_mm` before the surface."""
 
     radius_mm: float
     gap_mm: float
 
 
 class Bodies(NamedTuple):
-    """All that moves with the arm."""
+    """All bodies that move with the arm."""
 
     parts: tuple[Part, ...]
     housing: Housing
@@ -81,20 +82,20 @@ class Bodies(NamedTuple):
 
 
 def shipped_bodies() -> list[str]:
-    """Return the names of the arms whose bodies come with the planner."""
+    """Return the names of the arms with shipped bodies."""
     return sorted(file.stem for file in _SHIPPED.glob("*.toml"))
 
 
 def load_bodies(probe: Probe, T_FS: FloatArray, file: Path | str = "viper_s650") -> Bodies:
-    """Return the arm's parts in a TOML file, or those of a shipped arm by its name, with the probe's.
+    """Return the arm's parts from a TOML file, or of a shipped arm by its name, together with the probe's.
 
     Args:
-        probe: The probe.
+        probe: the probe.
         T_FS: `(4, 4)`, the probe in the flange's frame, in mm.
-        file: The file, or the name.
+        file: the file, or the name.
 
     Raises:
-        ScanFileError: The file cannot be read, or a key is missing, unknown or of the wrong type.
+        ScanFileError: the file cannot be read, or a key is missing, unknown or of the wrong type.
     """
     shipped = _SHIPPED / f"{file}.toml"
     top = TomlTable.load(shipped if shipped.is_file() else Path(file), ScanFileError)

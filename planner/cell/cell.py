@@ -1,8 +1,9 @@
-"""The scanning cell: the frames, how they are placed, and the arm's goal for every location and table angle.
+"""The scanning cell: the frames, their placements, and the arm's goal for every location and table angle.
 
-Frames: B base of the arm, T table (origin in the middle of its top, z along its axis), W workpiece (which turns with
-the table), F flange, S sensor (the probe: origin at the laser's exit, +Z along the beam, +X along the laser line, +Y
-the scan direction). Placements are rigid matrices, `T_BT` the pose of T in B.
+Frames: B is the base of the arm. T is the table, with its origin in the middle of its top, and z along its axis. W is
+the workpiece, which turns with the table. F is the flange. S is the sensor, that is, the probe. Its origin is at the
+laser's exit, +Z along the beam, +X along the laser line, +Y in the scan direction. Placements are rigid
+transformations: `T_BT` is the pose of T in B.
 """
 
 from dataclasses import dataclass, field
@@ -17,7 +18,7 @@ from planner.kinematics.arm import Arm
 
 @dataclass(frozen=True)
 class Table:
-    """The rotary table: a disc under the plane z = 0 of frame T, on a plinth that stands on the floor z = 0 of B."""
+    """The rotary table: a disc below the plane z = 0 of frame T, on a base that stands on the floor z = 0 of B."""
 
     radius_mm: float = 250.0
     thickness_mm: float = 20.0
@@ -26,16 +27,17 @@ class Table:
 
 @dataclass(frozen=True)
 class Probe:
-    """The laser probe as the planner sees it: one laser line, a measuring range, a housing.
+    """The laser probe in the planner: one laser line, a measuring range, a housing.
 
-    The paper names no make; range and line are a typical short-range triangulation probe's, the housing an estimate.
+    The paper does not name a product. Range and line are those of a typical short-range triangulation probe. The
+    housing is an estimate.
 
     Attributes:
-        stand_off_mm: Distance from the laser's exit to the surface, the middle of its range.
-        nearest_mm: Beginning of the measuring range.
-        farthest_mm: End of the measuring range.
-        line_width_mm: Width of the laser line at the stand-off.
-        body_mm: Size of the housing along X, Y and Z of frame S; it ends at the laser's exit plane z = 0.
+        stand_off_mm: distance from the laser's exit to the surface, in the middle of the measuring range.
+        nearest_mm: start of the measuring range.
+        farthest_mm: end of the measuring range.
+        line_width_mm: width of the laser line at the stand-off.
+        body_mm: size of the housing along X, Y and Z of frame S; it ends at the laser's exit plane z = 0.
     """
 
     stand_off_mm: float = 150.0
@@ -46,24 +48,24 @@ class Probe:
 
 
 def placement(*x_y_z_yaw_pitch_roll: float) -> FloatArray:
-    """Return the matrix `(4, 4)` of a pose in the robot language's six numbers, in mm and degrees."""
+    """Return the matrix `(4, 4)` of a pose given as six numbers of the robot language, in mm and degrees."""
     return np.asarray(from_xyz_yaw_pitch_roll(np.array([x_y_z_yaw_pitch_roll]))[0])
 
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """Arm, table and probe with their placements. The default figures are estimates of a cell like the paper's.
+    """Arm, table and probe with their placements. The defaults are estimates of a cell like that of the paper.
 
     Attributes:
-        arm: The arm; the origin of B is its foot.
-        T_BT: The table in the base.
-        T_TW: The workpiece on the table, at table angle 0.
-        T_FS: The probe on the flange.
-        table: The table's shape.
-        probe: The probe's shape and range.
+        arm: the arm; B has its origin at the foot of the arm.
+        T_BT: pose of the table in the base.
+        T_TW: pose of the workpiece on the table, at table angle 0.
+        T_FS: pose of the probe on the flange.
+        table: shape of the table.
+        probe: shape and measuring range of the probe.
 
     Raises:
-        PoseError: A placement is not a rigid transformation.
+        PoseError: a placement is not a rigid transformation.
     """
 
     arm: Arm = field(default_factory=Arm.load)

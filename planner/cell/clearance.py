@@ -1,8 +1,8 @@
-"""Clearance of the arm, the probe and its beam from each other and from the cell (section 3 of the paper).
+"""Clearances between the arm, the probe, its beam and the cell (section 3 of the paper).
 
-The clearance of a pose is the least signed distance of all pairs that can meet, so that the value function can grade
-proximity, and the pair that has it is the reason where it is too small. The beam is a light ray and not a body: near
-is fine, so it counts only where something blocks it.
+The clearance of a pose is the minimum signed distance over all pairs that can collide. So the value function can rate
+proximity, and the pair with the minimum is the reason for a low value. The beam is a light ray and not a body: it may
+be close to a body, and counts only when it is blocked.
 """
 
 from math import sqrt
@@ -30,32 +30,35 @@ from planner.geometry.solid import BOX, solid_distance
 from planner.kernel import kernel
 
 ARM_FRAMES = 4
-"""The frames from the base's on that bodies move with; none moves with the wrist's, and then comes the flange's."""
+"""The frames from the base on with which bodies move.
 
-# The columns of a placed body: its ends and its middle in the base, half its length, all in mm. The housing has two
-# half axes in the place of its ends, half its diagonal in the place of half its length, and the third half axis.
+No body moves with a frame of the wrist; the flange's frame is the last.
+"""
+
+# The columns of a placed body: its ends and its middle in the base, and half of its length, all in mm. The housing has
+# two half axes instead of its ends, half of its diagonal instead of half of its length, and the third half axis.
 _MIDDLE, _HALF_LENGTH, _THIRD = 6, 9, 10
 PLACED = 13
 """Columns of the table of placed bodies."""
 
 
-# Kernels take numbers and arrays, not the model: each array that is fetched from a tuple, and each view of an array,
-# is a counted reference, which costs more than the arithmetic here.
+# Kernels take numbers and arrays, not the model. Each array taken from a tuple, and each view of an array, is a counted
+# reference, which takes longer than the arithmetic.
 
 
 @kernel
 def place_bodies(
     bodies: FloatArray, frames: FloatArray, beam_mm: float, first: int, last: int, placed: FloatArray
 ) -> None:
-    """Write the ends in the base of the bodies that move with the frames `first` to `last` into `placed`.
+    """Write the ends of the bodies that move with the frames `first` to `last`, in the base, to `placed`.
 
     Args:
-        bodies: See `CollisionModel`.
+        bodies: see `CollisionModel`.
         frames: `(7, 3, 4)`, see `planner.kinematics.arm.link_frames`.
-        beam_mm: The beam's length.
-        first: The first frame.
-        last: The last frame.
-        placed: Written: `(n_bodies, PLACED)`, x y z of the start, the end and the middle, and half the length; of the
+        beam_mm: length of the beam.
+        first: first frame.
+        last: last frame.
+        placed: output `(n_bodies, PLACED)`: x y z of the start, the end and the middle, and half of the length; for the
             housing, see the columns.
     """
     for body in range(len(bodies)):
@@ -105,22 +108,22 @@ def nearest_pair(
     field_values: npt.NDArray[np.float32], field_levels: FloatArray,
     placed: FloatArray, obstacle_frames: FloatArray, angle: int, first: int, last: int, enough_mm: float,
 ) -> tuple[float, int]:  # fmt: skip
-    """Return the least clearance in mm of the pairs `first` to `last` - 1 and the pair that has it.
+    """Return the minimum clearance in mm of the pairs `first` to `last` - 1, and its pair.
 
-    Clearances of `enough_mm` or more are of no interest: if there is nothing below, that and -1 are returned.
+    Clearances of `enough_mm` or more are not needed: if there is none below, that value and -1 are returned.
 
     Args:
-        pairs: See `CollisionModel`.
-        bodies: See `CollisionModel`.
-        obstacles: See `CollisionModel`.
-        field_values: The model's field.
-        field_levels: Its grids.
+        pairs: see `CollisionModel`.
+        bodies: see `CollisionModel`.
+        obstacles: see `CollisionModel`.
+        field_values: values of the model's field.
+        field_levels: its grids.
         placed: `(n_bodies, PLACED)`, see `place_bodies`.
         obstacle_frames: `(n_angles, n_obstacles, 3, 4)`, see `base_in_obstacles`.
-        angle: Which of the table angles.
-        first: The first pair to look at.
-        last: The pair after the last one.
-        enough_mm: The clearance from which on a pair is far enough apart.
+        angle: index of the table angle.
+        first: the first pair to check.
+        last: the pair after the last one to check.
+        enough_mm: the clearance that is sufficient.
     """
     beam = len(bodies) - 1
     least, nearest = enough_mm, -1
@@ -151,7 +154,7 @@ def nearest_pair(
                     obstacles, field_values, field_levels,
                     placed, body, obstacle_frames, angle, i, bound + radius,
                 )  # fmt: skip
-        # Not by the difference: it would take a distance that is only known to be enough for a smaller one.
+        # Not by the difference: it would return a distance that is only known to be sufficient for a smaller value.
         if distance < bound + radius:
             least, nearest = distance - radius, pair
     return least, nearest
@@ -218,7 +221,7 @@ def _housing_from_obstacle(
 
 @kernel
 def _housing_distance(placed: FloatArray, housing: int, body: int, enough_mm: float) -> float:
-    """Return the distance of the housing from the segment of another body, as `solid_distance` does."""
+    """Return the distance of the housing from the segment of another body, like `solid_distance`."""
     ax, ay, az = _in_housing(placed, housing, body, 0)
     bx, by, bz = _in_housing(placed, housing, body, 3)
     return solid_distance(
@@ -235,7 +238,7 @@ def _length(placed: FloatArray, body: int, at: int) -> float:
 
 @kernel
 def _in_housing(placed: FloatArray, housing: int, body: int, at: int) -> tuple[float, float, float]:
-    """Return a placed body's point, from column `at` on, along the housing's axes from its middle."""
+    """Return a point of a placed body, from column `at` on, in the housing's frame."""
     x = placed[body, at] - placed[housing, _MIDDLE]
     y = placed[body, at + 1] - placed[housing, _MIDDLE + 1]
     z = placed[body, at + 2] - placed[housing, _MIDDLE + 2]
@@ -256,7 +259,7 @@ def _along(placed: FloatArray, housing: int, at: int, x: float, y: float, z: flo
 def _turned(
     frames: FloatArray, angle: int, i: int, placed: FloatArray, body: int, at: int
 ) -> tuple[float, float, float]:
-    """Return a placed body's vector, from column `at` on, as obstacle `i` sees it."""
+    """Return a vector of a placed body, from column `at` on, in the frame of obstacle `i`."""
     x, y, z = placed[body, at], placed[body, at + 1], placed[body, at + 2]
     return (
         frames[angle, i, 0, 0] * x + frames[angle, i, 0, 1] * y + frames[angle, i, 0, 2] * z,
@@ -269,7 +272,7 @@ def _turned(
 def _in_frame(
     frames: FloatArray, angle: int, i: int, placed: FloatArray, body: int, at: int
 ) -> tuple[float, float, float]:
-    """Return a placed body's point, from column `at` on, as obstacle `i` sees it."""
+    """Return a point of a placed body, from column `at` on, in the frame of obstacle `i`."""
     x, y, z = placed[body, at], placed[body, at + 1], placed[body, at + 2]
     return (
         frames[angle, i, 0, 0] * x + frames[angle, i, 0, 1] * y + frames[angle, i, 0, 2] * z + frames[angle, i, 0, 3],

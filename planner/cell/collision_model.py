@@ -1,7 +1,7 @@
-"""What can collide with what: the bodies that move with the arm, the obstacles of the cell, the pairs that can meet.
+"""The collision model: the bodies that move with the arm, the obstacles of the cell, and the pairs that can collide.
 
-Neighbors in the chain of bodies touch by construction and are not a pair. How far the bodies of a pair are apart is
-found in `planner.cell.clearance`.
+Neighbors in the chain of bodies touch by construction and are not a pair. `planner.cell.clearance` computes the
+distances of the pairs.
 """
 
 from collections.abc import Sequence
@@ -15,10 +15,11 @@ from planner.cell.obstacles import Obstacle, bounding_box
 from planner.geometry.signed_distance_field import NO_FIELD, SignedDistanceField
 from planner.geometry.transforms import rotations_z
 
-# The columns of the bodies' table: the frame that a body moves with, its ends there in mm, its radius in mm; of the
-# housing, the first two half axes in the place of the ends, then its middle, and the length of the third half axis.
+# The columns of the table of bodies: the frame that a body moves with, its ends in that frame in mm, its radius in mm.
+# The housing has its first two half axes instead of the ends, then its middle, and the length of the third half axis.
 FRAME, START, END, RADIUS, MIDDLE, THIRD = 0, 1, 4, 7, 8, 11
-# Those of the obstacles' table: the kind, three sizes, the least and the greatest x y z of a box around it, in mm.
+# The columns of the table of obstacles: the kind, three sizes, and the minimum and maximum x y z of its bounding box,
+# in mm.
 KIND, SIZE, LOWER, UPPER = 0, 1, 4, 7
 
 _FIXED_LINK = 0
@@ -27,21 +28,21 @@ _BEAM = "beam"
 
 
 class CollisionModel(NamedTuple):
-    """What can collide with what, in the plain arrays that compiled kernels take; lengths in mm.
+    """The collision model in the plain arrays that compiled kernels take; lengths in mm.
 
-    A body is a part, or, as the last two, the housing and the beam. An obstacle is numbered after the bodies.
+    A body is a part, or, as the last two, the housing and the beam. Obstacles are numbered after the bodies.
 
     Attributes:
-        bodies: `(n_bodies, 12)`, one row each; the beam's ends are one mm apart.
-        obstacles: `(n_obstacles, 10)`, the kind, three sizes, and a box around it in its own frame.
-        field: Of the one obstacle that is a mesh.
-        pairs: `(n_pairs, 2)`, a body and another one or an obstacle. Those of the flange's bodies with the obstacles
-            come first: they are common to all configurations.
-        n_common: How many those are.
-        poses: `(n_obstacles, 4, 4)`, of the obstacles in the table's frame or the base's.
-        turning: `(n_obstacles,)`, which of the two.
-        T_BT: `(4, 4)`, the table's axis at angle 0 in the base.
-        beam_gap_mm: What the beam stops short of the surface.
+        bodies: `(n_bodies, 12)`, one row each; the beam has a length of 1 mm.
+        obstacles: `(n_obstacles, 10)`, the kind, three sizes, and its bounding box in its own frame.
+        field: the field of the one obstacle that is a mesh.
+        pairs: `(n_pairs, 2)`, a body and another body or an obstacle. Pairs of the flange's bodies with the obstacles
+            are first: they are common to all configurations.
+        n_common: number of these pairs.
+        poses: `(n_obstacles, 4, 4)`, the obstacles in the frame of the table or of the base.
+        turning: `(n_obstacles,)`, whether the frame is that of the table.
+        T_BT: `(4, 4)`, the table at angle 0 in the base.
+        beam_gap_mm: distance from the end of the beam to the surface.
     """
 
     bodies: FloatArray
@@ -65,7 +66,7 @@ def collision_model(
     """Return the model and the name of each of its pairs, such as "probe and table".
 
     Raises:
-        ValueError: More than one obstacle is a field, or a part turns with joint 4 or 5.
+        ValueError: more than one obstacle is a field, or a part moves with joint 4 or 5.
     """
     if any(part.frame in _WRIST_FRAMES for part in bodies.parts):
         raise ValueError("a part moves with frame 4 or 5; both flips of the wrist must put every part in one place")
@@ -94,7 +95,10 @@ def collision_model(
 
 
 def _body_table(bodies: Bodies, T_FS: FloatArray) -> FloatArray:
-    """Return the parts in their frames, a row each, the housing, and the beam, one mm long, in the flange's."""
+    """Return the parts in their frames, one row each.
+
+    Then follow the housing and a beam of 1 mm, in the frame of the flange.
+    """
     start, axis = T_FS[:3, 3], T_FS[:3, 2]
     table = np.zeros((len(bodies.parts) + 2, THIRD + 1))
     table[:-2, : RADIUS + 1] = [[part.frame, *part.start_mm, *part.end_mm, part.radius_mm] for part in bodies.parts]
@@ -126,7 +130,7 @@ def _pairs(bodies: Bodies, obstacles: Sequence[Obstacle]) -> tuple[IndexArray, i
 
 
 def base_in_obstacles(model: CollisionModel, table_angles_deg: FloatArray) -> FloatArray:
-    """Return `(n_angles, n_obstacles, 3, 4)`: the base's frame seen from each obstacle's, for each table angle."""
+    """Return `(n_angles, n_obstacles, 3, 4)`: the base's frame in the frame of each obstacle, for each table angle."""
     table = (model.T_BT @ rotations_z(table_angles_deg))[:, None]
     in_base = np.where(model.turning[:, None, None], table @ model.poses, model.poses)
     return np.ascontiguousarray(np.linalg.inv(in_base)[:, :, :3])

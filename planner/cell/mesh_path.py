@@ -1,4 +1,4 @@
-"""A pattern over a mesh: laid on the ideal shape about the part, then brought to the stand-off along each beam."""
+"""A pattern on a mesh: created on the ideal shape around the part, then moved along each beam to the stand-off."""
 
 from collections.abc import Callable
 
@@ -60,11 +60,11 @@ def mesh_waypoints(
 
     Args:
         mesh: The part, in mm.
-        kind: Its class.
+        kind: its class.
         pattern: A pattern of that class.
-        T_TW: `(4, 4)`, the part on the table; the pattern is laid about the table's vertical.
-        probe: The probe.
-        layout: How the strips lie.
+        T_TW: `(4, 4)`, pose of the part on the table; the pattern is created around the table's vertical axis.
+        probe: the probe.
+        layout: layout of the strips.
 
     Raises:
         PathError: No beam meets the mesh, or the pattern has too many strips.
@@ -78,10 +78,11 @@ def mesh_waypoints(
 def following(waypoints: FloatArray, mesh: trimesh.Trimesh, stand_off_mm: float) -> FloatArray:
     """Return waypoints `(n, 4, 4)` moved along their beams until the nearest surface around each is at the stand-off.
 
-    Where no surface is near a beam, the way is that between its neighbors. Waypoints that fit the mesh stay.
+    If no surface is near a beam, the displacement is interpolated from its neighbors. Waypoints that already fit the
+    mesh are not moved.
 
     Raises:
-        PathError: No beam meets the mesh.
+        PathError: no beam meets the mesh.
     """
     rays = RayCaster(mesh)
     distances_mm = first_distances_mm(rays, mesh, waypoints, np.zeros((1, 2)))[:, 0]
@@ -98,13 +99,13 @@ def following(waypoints: FloatArray, mesh: trimesh.Trimesh, stand_off_mm: float)
 
 
 def first_distances_mm(rays: RayCaster, mesh: trimesh.Trimesh, poses: FloatArray, beside_mm: FloatArray) -> FloatArray:
-    """Return how far from each probe, along its beam, the outermost surface is, `(n, m)`; NaN where there is none.
+    """Return the distance from each probe along its beam to the outermost surface, `(n, m)`; NaN if there is none.
 
     Args:
-        rays: The mesh to cast rays at.
-        mesh: The same mesh.
-        poses: `(n, 4, 4)`, probes, which may be within the mesh.
-        beside_mm: `(m, 2)`, by how much each ray is beside the beam, along x and y of the probe.
+        rays: the mesh for ray casting.
+        mesh: the same mesh.
+        poses: `(n, 4, 4)`, probes, which may be inside the mesh.
+        beside_mm: `(m, 2)`, offset of each ray from the beam, along x and y of the probe.
     """
     back_mm = _beyond_mm(mesh, poses)
     starts = poses[:, np.newaxis, :3, 3] + np.einsum("mk,nik->nmi", beside_mm, poses[:, :3, :2])
@@ -115,7 +116,7 @@ def first_distances_mm(rays: RayCaster, mesh: trimesh.Trimesh, poses: FloatArray
 
 
 def _beyond_mm(mesh: trimesh.Trimesh, poses: FloatArray) -> float:
-    """Return a distance that leads out of the mesh from every probe."""
+    """Return a distance that reaches the outside of the mesh from every probe."""
     away = poses[:, :3, 3] - np.asarray(mesh.bounds).mean(axis=0)
     return float(np.linalg.norm(away, axis=1).max() + np.linalg.norm(mesh.extents))
 
@@ -128,5 +129,5 @@ def _disc(radius_mm: float) -> FloatArray:
 
 
 def _nearest(distances_mm: FloatArray) -> FloatArray:
-    """Return the least of each row `(n, m)`, infinite where it has none."""
+    """Return the minimum of each row `(n, m)`, infinity for a row of NaN."""
     return np.asarray(np.where(np.isfinite(distances_mm), distances_mm, np.inf).min(axis=1))

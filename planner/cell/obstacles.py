@@ -1,4 +1,4 @@
-"""What stands in the cell for the arm to hit: the table on its plinth, the floor, and the workpiece.
+"""The obstacles in the cell: the table on its base, the floor, and the workpiece.
 
 Shapes are exact solids, or the signed distance field of a mesh.
 """
@@ -19,21 +19,22 @@ from protocol.progress import Progress
 _FLOOR_SIDE_MM = 10_000.0
 _FLOOR_THICKNESS_MM = 100.0
 _FIELD_POINTS = 120_000
-"""Grid points of a workpiece's field: a block of 200 mm gets one every 4 mm, and a map's look-ups stay in the
-processor's cache."""
+"""Number of grid points of a workpiece's field.
+
+A block of 200 mm has a spacing of 4 mm, and a map's look-ups stay in the processor's cache."""
 
 
 class Obstacle(NamedTuple):
-    """Something in the cell that the arm can hit.
+    """An object in the cell that the arm can hit.
 
     Attributes:
-        name: What reasons call it.
+        name: its name in reasons.
         kind: BOX, CYLINDER or CAPSULE of `planner.geometry.solid`, or FIELD.
-        size_mm: `(3,)`, as the kind has it; unused for a field.
-        pose: `(4, 4)`, the shape's frame in the table's (for one that turns with it) or in the base's.
-        turning: Whether it turns with the table.
-        field: The field, for that kind.
-        stops_light: Whether the beam must not pass it. Space that nobody has seen is solid for the arm alone.
+        size_mm: `(3,)`, depends on the kind; unused for a field.
+        pose: `(4, 4)`, the shape's frame in the table's frame if it turns with the table, else in the base's frame.
+        turning: whether it turns with the table.
+        field: the field, for that kind.
+        stops_light: whether the beam must not pass it. Space that nobody has seen is solid for the arm alone.
     """
 
     name: str
@@ -46,7 +47,7 @@ class Obstacle(NamedTuple):
 
 
 def box(name: str, lengths_mm: tuple[float, float, float], pose: FloatArray, *, turning: bool) -> Obstacle:
-    """Return a box by its full lengths along x, y and z, centered on `pose`."""
+    """Return a box with full lengths along x, y and z, centered on `pose`."""
     return Obstacle(name, BOX, np.array(lengths_mm, dtype=np.float64) / 2, pose, turning)
 
 
@@ -56,12 +57,12 @@ def cylinder(name: str, radius_mm: float, height_mm: float, pose: FloatArray, *,
 
 
 def sphere(name: str, radius_mm: float, pose: FloatArray, *, turning: bool) -> Obstacle:
-    """Return a sphere: a capsule without length."""
+    """Return a sphere: a capsule of length 0."""
     return Obstacle(name, CAPSULE, np.array([radius_mm, 0.0, 0.0]), pose, turning)
 
 
 def bounding_box(obstacle: Obstacle) -> tuple[FloatArray, FloatArray]:
-    """Return the least and the greatest x y z `(3,)` in mm of an obstacle in its own frame."""
+    """Return the minimum and maximum x y z `(3,)` in mm of an obstacle in its own frame."""
     if obstacle.field is not None:
         values, origin = obstacle.field.finest()
         return origin, origin + obstacle.field.spacing_mm * (np.array(values.shape) - 1)
@@ -71,7 +72,7 @@ def bounding_box(obstacle: Obstacle) -> tuple[FloatArray, FloatArray]:
 
 
 def cell_obstacles(cell: Cell) -> tuple[Obstacle, ...]:
-    """Return the table, its plinth and the floor, the plane z = 0 of the base."""
+    """Return the table, its base and the floor, the plane z = 0 of frame B."""
     table = cell.table
     disc = cylinder("table", table.radius_mm, table.thickness_mm, _at_height(-table.thickness_mm / 2), turning=True)
     floor = box(
@@ -88,20 +89,20 @@ def cell_obstacles(cell: Cell) -> tuple[Obstacle, ...]:
         table.plinth_radius_mm,
         height_mm,
         _at_height(-table.thickness_mm - height_mm / 2),
-        turning=True,  # it does not, but as a body of revolution about the table's axis it looks the same
+        turning=True,  # it does not, but a body of revolution around the table's axis looks the same
     )
     return disc, plinth, floor
 
 
 def workpiece_obstacle(scan: Scan, progress: Progress | None = None) -> Obstacle:
-    """Return a scan's workpiece: an ideal sphere or cylinder as itself, anything else as the field of its mesh.
+    """Return a scan's workpiece: an ideal sphere or cylinder as such, any other shape as the field of its mesh.
 
     Args:
-        scan: The scan.
-        progress: See `signed_distance_field.build_field`; called only where the field is not in the cache.
+        scan: the scan.
+        progress: see `signed_distance_field.build_field`; called only if the field is not in the cache.
     """
     T_TW, workpiece = scan.cell.T_TW, scan.workpiece
-    # A class may also have been measured off a mesh file, and then the mesh is what can be hit.
+    # The class may also have been derived from a mesh file; then the mesh is the obstacle.
     if scan.mesh_file is None and isinstance(workpiece, Sphere):
         radius_mm = workpiece.diameter_mm / 2
         return sphere("workpiece", radius_mm, _based(T_TW, workpiece.middle_mm, radius_mm), turning=True)

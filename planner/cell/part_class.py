@@ -1,4 +1,4 @@
-"""Which class a mesh is nearest to, so that a scan of it can begin with a pattern that fits."""
+"""Find the class that is nearest to a mesh, so that its scan can start with a suitable pattern."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from planner.arrays import FloatArray
 from planner.cell.workpiece import Mould, Sphere
 from planner.errors import WorkpieceError
 
-# A sphere, and a round outline, as meshes and teeth of gears have them.
+# Tolerance for a sphere, and for a round outline, of a mesh and of gear teeth.
 _SPHERE_ERROR = 0.03
 _ROUND_RATIO = 1.06
 # Below this height a horizontal probe would touch the table.
@@ -20,11 +20,11 @@ _LEAST_CAVITY_SHARE = 0.2
 
 
 class PartClass(NamedTuple):
-    """What a part looks like.
+    """The shape of a part.
 
     Attributes:
-        kind: Its class in a scan file.
-        name: What people call it.
+        kind: its class in a scan file.
+        name: its everyday name.
     """
 
     kind: str
@@ -32,7 +32,7 @@ class PartClass(NamedTuple):
 
 
 def part_class(mesh: trimesh.Trimesh) -> PartClass:
-    """Return the class that an upright mesh in mm is nearest to."""
+    """Return the class that is nearest to an upright mesh in mm."""
     length_mm, width_mm, height_mm = (float(side) for side in mesh.extents)
     if _is_sphere(mesh):
         return PartClass("sphere", "sphere")
@@ -59,7 +59,7 @@ def _is_sphere(mesh: trimesh.Trimesh) -> bool:
 
 
 def _is_round(mesh: trimesh.Trimesh) -> bool:
-    """Return whether the outline from above is about as far from its middle in all directions."""
+    """Return whether the outline from above has about the same distance from its middle in all directions."""
     lower, upper = np.asarray(mesh.bounds)
     outline: FloatArray = np.asarray(mesh.vertices)[:, :2] - 0.5 * (lower + upper)[:2]
     turn = np.radians(np.arange(0.0, 360.0, 7.5))

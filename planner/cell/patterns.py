@@ -1,7 +1,7 @@
 """The predefined scanning patterns of Fig. 2, as waypoints of the probe over an idealized workpiece.
 
-Each pattern is drawn as corners in two or more coordinates of the surface (such as azimuth and height), filled in
-between, and laid onto the surface. Neighboring strips lie line width x (1 - overlap) apart.
+Each pattern is defined by corners in two or more coordinates of the surface (such as azimuth and height). Points are
+filled in between, and placed on the surface. The distance of neighboring strips is line width x (1 - overlap).
 
 | Fig. 2 | class    | patterns                                                  |
 |--------|----------|-----------------------------------------------------------|
@@ -10,7 +10,7 @@ between, and laid onto the surface. Neighboring strips lie line width x (1 - ove
 | (c)    | mould    | raster (zigzag from above)                                |
 | (d)    | mould    | crossed (two rasters), tilted (strips seen from two sides) |
 
-A block has the patterns of a mould, over its top.
+A block has the patterns of a mould, on its top.
 """
 
 import itertools
@@ -27,22 +27,22 @@ from planner.cell.scan_path import looking_at
 from planner.cell.workpiece import Block, Cylinder, Mould, Sphere
 from planner.errors import PathError
 
-# Distance of the waypoints filled in between corners, in mm or in degrees of the coordinate that moves most.
+# Distance of the waypoints between corners, in mm, or in degrees of the coordinate that changes most.
 _SPACING = 2.0
 _MOST_STRIPS = 1000
 
 
 @dataclass(frozen=True)
 class StripLayout:
-    """How the strips of a pattern lie.
+    """The layout of a pattern's strips.
 
     Attributes:
-        overlap: Share of the line's width that a strip has in common with its neighbor.
-        top_polar_deg: Where a sphere's strips begin, as an angle from its pole.
-        lowest_polar_deg: Where a sphere's strips end: below its equator the table is in the way.
-        bottom_margin_mm: Least height of the line's middle over the base of a cylinder.
-        wall_margin_mm: How far from a mould's walls its strips end, so that the beam passes the wall.
-        tilt_deg: How far `tilted` leans the beam to see the walls.
+        overlap: share of the line's width that a strip has in common with its neighbor.
+        top_polar_deg: start of a sphere's strips, as an angle from its pole.
+        lowest_polar_deg: end of a sphere's strips; below its equator the table is in the way.
+        bottom_margin_mm: minimum height of the line's middle above the base of a cylinder.
+        wall_margin_mm: distance of the ends of the strips from the walls of a mould, so that the beam passes the wall.
+        tilt_deg: tilt of the beam in the pattern `tilted`, to scan the walls.
     """
 
     overlap: float = 0.2
@@ -57,27 +57,27 @@ class StripLayout:
         return line_width_mm * (1.0 - self.overlap)
 
     def strip_centers(self, span_mm: float, line_width_mm: float) -> FloatArray:
-        """Return the evenly spread middles of the fewest strips that cover a span about 0."""
+        """Return the evenly spaced middles of the minimum number of strips that cover a span around 0."""
         beyond = max(0.0, span_mm - line_width_mm)
         count = 1 + strip_count(beyond, self.pitch_mm(line_width_mm))
         return np.linspace(-0.5 * beyond, 0.5 * beyond, count) if count > 1 else np.zeros(1)
 
 
 def strip_count(span: float, pitch: float) -> int:
-    """Return how many strips of that pitch cover a span.
+    """Return the number of strips of this pitch that cover a span.
 
     Raises:
-        PathError: There are more than can be meant.
+        PathError: the number of strips is too large.
     """
     if not span < _MOST_STRIPS * pitch:
         raise PathError(
-            f"the pattern has more than {_MOST_STRIPS:,} strips; is the probe's line_width_mm or the overlap wrong?"
+            f"the pattern has more than {_MOST_STRIPS:,} strips; check the probe's line_width_mm and the overlap"
         )
     return math.ceil(span / pitch - 1e-9)
 
 
 def sphere_meridians(sphere: Sphere, probe: Probe, layout: StripLayout) -> FloatArray:
-    """Return a zigzag down one meridian and up the next, the line across the meridian."""
+    """Return a zigzag down one meridian and up the next, with the line across the meridian."""
     radius = 0.5 * sphere.diameter_mm
     count = strip_count(2.0 * math.pi * radius, layout.pitch_mm(probe.line_width_mm))
     ends = (layout.top_polar_deg, layout.lowest_polar_deg)
@@ -90,9 +90,9 @@ def sphere_meridians(sphere: Sphere, probe: Probe, layout: StripLayout) -> Float
 
 
 def sphere_spiral(sphere: Sphere, probe: Probe, layout: StripLayout) -> FloatArray:
-    """Return a spiral from the pole down that sinks one strip per turn, the line along the meridian.
+    """Return a spiral from the pole down by one strip per turn, with the line along the meridian.
 
-    It begins and ends in a full turn at one polar angle, or else a wedge at either end would be left out.
+    It starts and ends with a full turn at a constant polar angle; otherwise a wedge at each end would be missed.
     """
     turn_deg = math.degrees(layout.pitch_mm(probe.line_width_mm) / (0.5 * sphere.diameter_mm))
     top, lowest = layout.top_polar_deg, layout.lowest_polar_deg
@@ -112,16 +112,16 @@ def _on_sphere(sphere: Sphere, probe: Probe, polar: FloatArray, azimuth: FloatAr
 
 
 def cylinder_rings(cylinder: Cylinder, probe: Probe, layout: StripLayout) -> FloatArray:
-    """Return full turns at one height each, from the bottom up, without turning back."""
+    """Return full turns at one height each, from the bottom up, always in the same direction."""
     heights = _ring_heights(cylinder, probe, layout)
     corners = [(360.0 * (ring + end), height) for ring, height in enumerate(heights) for end in (0.0, 1.0)]
     return _on_cylinder(cylinder, probe, corners)
 
 
 def cylinder_helix(cylinder: Cylinder, probe: Probe, layout: StripLayout) -> FloatArray:
-    """Return a helix from the bottom up that climbs one strip per turn.
+    """Return a helix from the bottom up by one strip per turn.
 
-    It begins and ends in a full turn at one height, or else a wedge at either end would be left out.
+    It starts and ends with a full turn at a constant height; otherwise a wedge at each end would be missed.
     """
     heights = _ring_heights(cylinder, probe, layout)
     bottom, top, turns = heights[0], heights[-1], len(heights) - 1
@@ -148,12 +148,12 @@ def _on_cylinder(cylinder: Cylinder, probe: Probe, corners: list[tuple[float, fl
 
 
 class Floor(NamedTuple):
-    """A level rectangle that strips are laid on; length along x, width along y.
+    """A level rectangle for strips; its length is along x, its width along y.
 
     Attributes:
-        length_mm: How far the strips' middles go along x.
-        width_mm: How far the strips reach along y, their lines' halves included.
-        middle_mm: Its middle.
+        length_mm: length of the middles of the strips along x.
+        width_mm: extent of the strips along y, including half of the line on each side.
+        middle_mm: its middle.
     """
 
     length_mm: float
@@ -162,7 +162,7 @@ class Floor(NamedTuple):
 
 
 def floor_of(workpiece: Mould | Block, layout: StripLayout) -> tuple[Floor, Floor]:
-    """Return what strips along x are laid on, and what strips along y are: a mould's cavity, a block's whole top."""
+    """Return the rectangles for strips along x and along y: a mould's cavity, or the whole top of a block."""
     if isinstance(workpiece, Block):
         top = Floor(workpiece.length_mm, workpiece.width_mm, np.add(workpiece.middle_mm, (0, 0, workpiece.height_mm)))
         return top, top._replace(length_mm=top.width_mm, width_mm=top.length_mm)
@@ -176,13 +176,13 @@ def floor_of(workpiece: Mould | Block, layout: StripLayout) -> tuple[Floor, Floo
 
 
 def raster(workpiece: Mould | Block, probe: Probe, layout: StripLayout) -> FloatArray:
-    """Return a zigzag of strips along the length, seen from straight above."""
+    """Return a zigzag of strips along the length, from vertically above."""
     along, _ = floor_of(workpiece, layout)
     return _on_floor(along, probe, _strips(along, probe, layout))
 
 
 def crossed(workpiece: Mould | Block, probe: Probe, layout: StripLayout) -> FloatArray:
-    """Return the raster along the length, then one across it with the line turned by 90 degrees."""
+    """Return the raster along the length, then one across it with the line rotated by 90 degrees."""
     floor, across = floor_of(workpiece, layout)
     along = _strips(floor, probe, layout)
     crossing = [(-y, x, 90.0, tilt) for x, y, _, tilt in _strips(across, probe, layout)]
@@ -190,7 +190,7 @@ def crossed(workpiece: Mould | Block, probe: Probe, layout: StripLayout) -> Floa
 
 
 def tilted(workpiece: Mould | Block, probe: Probe, layout: StripLayout) -> FloatArray:
-    """Return the raster with the beam leaning to one side of the travel, then back with it leaning to the other."""
+    """Return the raster with the beam tilted to one side of the travel, then back with it tilted to the other."""
     floor, _ = floor_of(workpiece, layout)
     strips = _strips(floor, probe, layout)
     leaning = [(x, y, turn, layout.tilt_deg) for x, y, turn, _ in strips]
@@ -199,7 +199,7 @@ def tilted(workpiece: Mould | Block, probe: Probe, layout: StripLayout) -> Float
 
 
 FloorCorner = tuple[float, float, float, float]
-"""Where on the floor (x, y in mm), how far the line is turned about z and the beam tilted across it (deg)."""
+"""Position on the floor (x, y in mm), rotation of the line around z, and tilt of the beam across it (deg)."""
 
 
 def _strips(floor: Floor, probe: Probe, layout: StripLayout) -> list[FloorCorner]:
@@ -218,7 +218,7 @@ def _from_nearer_end(corners: list[FloorCorner], start: FloorCorner) -> list[Flo
 def _on_floor(floor: Floor, probe: Probe, corners: list[FloorCorner]) -> FloatArray:
     x, y, turn_deg, tilt_deg = _filled(corners).T
     turn, tilt = np.radians(turn_deg), np.radians(tilt_deg)
-    # Untilted and unturned, the strip runs along x and the line lies along y.
+    # Without tilt and rotation, the strip is along x and the line along y.
     lines = np.column_stack((-np.sin(turn), np.cos(turn), np.zeros_like(turn)))
     normals = np.sin(tilt)[:, np.newaxis] * lines + np.cos(tilt)[:, np.newaxis] * np.array([0.0, 0.0, 1.0])
     points = np.column_stack((x, y, np.zeros_like(x))) + floor.middle_mm
@@ -231,7 +231,7 @@ PATTERNS: dict[str, dict[str, Callable[..., FloatArray]]] = {
     "mould": {"crossed": crossed, "raster": raster, "tilted": tilted},
     "sphere": {"meridians": sphere_meridians, "spiral": sphere_spiral},
 }
-"""The patterns of each workpiece class, by name; all take the workpiece, the probe and the layout."""
+"""The patterns of each workpiece class, by name. Each takes the workpiece, the probe and the layout."""
 
 
 def _filled(corners: list[tuple[float, ...]] | list[FloorCorner] | list[tuple[float, float]]) -> FloatArray:

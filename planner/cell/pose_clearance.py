@@ -1,4 +1,4 @@
-"""The clearance of each pose on its own, without the bounds that spare the map most of its pairs."""
+"""The exact clearance of each pose, without the bounds that let the map skip most of its pairs."""
 
 from typing import NamedTuple
 

@@ -1,7 +1,7 @@
 """A scan problem: cell, workpiece, path, limits and weights, read from one TOML file.
 
-Keys carry their units; placements are x y z in mm and yaw pitch roll in degrees. Files named in a scan file are
-looked for beside it.
+Keys include their units. Placements are x y z in mm and yaw pitch roll in degrees. File names in a scan file are
+relative to its folder.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -34,7 +34,7 @@ from protocol.toml_table import TomlTable
 DEFAULT_ARM = "viper_s650"
 ADAPTIVE = "adaptive"
 """The pattern of a scan without a predefined path: all of its strips are chosen by what was not seen yet."""
-# A workpiece may touch the table, and a mesh's base need not be ground flat.
+# A workpiece may touch the table, and the base of a mesh need not be exactly flat.
 _BASE_TOLERANCE_MM = 0.5
 # Of any path, those of adaptive scanning included.
 _FEWEST_LOCATIONS = 2
@@ -45,16 +45,16 @@ class Scan:
     """Everything that a configuration map and a plan need.
 
     Attributes:
-        name: The scan file's name without its ending.
-        cell: Arm, table and probe.
-        bodies: What moves with the arm and must not collide.
-        workpiece: The workpiece's class and dimensions; None for a mesh of no class.
-        mesh: The workpiece's closed surface in frame W, mm.
-        mesh_file: Where that surface was read; None where it follows from the dimensions.
-        predefined_path: Where the probe must be; None where `path.pattern` is adaptive.
-        value: What makes a pose good.
-        limits: The table's limits.
-        weights: Weights of the table's motion.
+        name: name of the scan file without its suffix.
+        cell: arm, table and probe.
+        bodies: bodies that move with the arm and must not collide.
+        workpiece: class and dimensions of the workpiece; None for a mesh without a class.
+        mesh: closed surface of the workpiece in frame W, in mm.
+        mesh_file: file of that surface; None if it follows from the dimensions.
+        predefined_path: the required poses of the probe; None where `path.pattern` is adaptive.
+        value: the value function for poses.
+        limits: limits of the table.
+        weights: weights for the motion of the table.
     """
 
     name: str
@@ -89,16 +89,17 @@ class Scan:
 
 
 def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progress: Progress | None = None) -> Scan:
-    """Return the scan of a TOML file, or a shipped one by its name.
+    """Return the scan from a TOML file, or a shipped one by its name.
 
     Args:
-        scan: The file, or the name.
-        say: Called with one line when harmless flaws of the workpiece's mesh were mended, and with one that names the
+        scan: the file, or the name.
+        say: called with one line for each harmless flaw of the mesh that was repaired. It is also called with the
             locations at which the beam does not meet the workpiece.
-        progress: See `load_mesh`.
+        progress: see `load_mesh`.
 
     Raises:
-        PlannerError: A file cannot be read, or holds a key, value or shape that is not allowed; the message names it.
+        PlannerError: a file cannot be read, or contains a key, value or shape that is not allowed. The message names
+            it.
     """
     shipped = SCANS / f"{scan}.toml"
     file = shipped if shipped.is_file() else Path(scan)
@@ -115,8 +116,8 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progre
         limits = _read_limits(top.table("limits"))
         weights = _read_weights(top.table("weights"), limits)
         if costs_overflow(weights, limits, _FEWEST_LOCATIONS if path is None else len(path.T_WS)):
-            raise ScanFileError(f"{file}: weights: k_a or k_w is so large that the cost of a path overflows; lower it")
-    # A pattern on a shape of given dimensions meets it by construction.
+            raise ScanFileError(f"{file}: weights: k_a or k_w is so large that the cost of a path overflows; reduce it")
+    # A pattern on a shape of given dimensions always meets it.
     if say is not None and path is not None and (mesh_file is not None or "file" in top.table("path")):
         warning = beam_warning(path.T_WS, mesh, cell.probe)
         if warning is not None:
@@ -131,10 +132,10 @@ def with_mesh(
     say: Callable[[str], None] | None = None,
     progress: Progress | None = None,
 ) -> Scan:
-    """Return the scan with the workpiece of another file in the place of its own; see `load_mesh`.
+    """Return the scan with the workpiece replaced by that of another file; see `load_mesh`.
 
     Raises:
-        WorkpieceError: The mesh cannot be a workpiece, or does not fit the table.
+        WorkpieceError: the mesh cannot be a workpiece, or does not fit the table.
     """
     mesh = load_mesh(file, unit, say, progress)
     with _named(file):
@@ -144,7 +145,7 @@ def with_mesh(
 
 @contextmanager
 def _named(file: Path) -> Iterator[None]:
-    """Put the file's name before messages that do not know it."""
+    """Add the file's name to messages without it."""
     try:
         yield
     except ScanFileError:
@@ -169,20 +170,20 @@ def _read_cell(section: TomlTable, folder: Path) -> tuple[Cell, Bodies]:
 
 
 def _bodies_file(section: TomlTable, folder: Path, arm_file: Path | str) -> Path | str:
-    """Return the file of the arm's bodies: a shipped arm brings its own, of any other arm nothing is known."""
+    """Return the file of the arm's bodies. A shipped arm has such a file; for other arms there is none."""
     if "bodies" in section:
         return _beside(section, folder, "bodies", shipped_bodies())
     if arm_file in shipped_bodies():
         return arm_file
     raise section.refuse(
         "bodies",
-        f"the file of the collision bodies of {arm_file}, since those of another arm would be wrong: copy one of"
+        f"the file of the collision bodies of {arm_file}, because those of another arm would be wrong: copy one of"
         f" {', '.join(shipped_bodies())} from planner/bodies/, and fit its capsules to the arm",
     )
 
 
 def _beside(section: TomlTable, folder: Path, key: str, shipped: Sequence[str]) -> Path | str:
-    """Return the file that a key names in the scan file's folder, else the name if it is that of a shipped one."""
+    """Return the file that a key names in the scan file's folder, else the name if it is a shipped one."""
     name = section.text(key, DEFAULT_ARM)
     if (folder / name).is_file():
         return folder / name
@@ -244,20 +245,20 @@ def _read_workpiece(
 
 
 def check_it_fits_the_table(mesh: trimesh.Trimesh, cell: Cell) -> None:
-    """Refuse a workpiece that reaches beyond the table's edge or below its top.
+    """Refuse a workpiece that extends beyond the table's edge or below its top.
 
     Raises:
-        WorkpieceError: It does.
+        WorkpieceError: the workpiece does not fit.
     """
     reach_mm = radius_about_axis_mm(mesh, cell.T_TW)
     if reach_mm > cell.table.radius_mm:
         raise WorkpieceError(
-            f"the workpiece reaches {reach_mm:.1f} mm from the table's axis;"
+            f"the workpiece extends {reach_mm:.1f} mm from the table's axis;"
             f" it must stay within the table's radius of {cell.table.radius_mm:g} mm"
         )
     lowest_mm = float((np.asarray(mesh.vertices) @ cell.T_TW[2, :3]).min() + cell.T_TW[2, 3])
     if lowest_mm < -_BASE_TOLERANCE_MM:
-        raise WorkpieceError(f"the workpiece reaches {-lowest_mm:.1f} mm below the table's top; it must stand on it")
+        raise WorkpieceError(f"the workpiece extends {-lowest_mm:.1f} mm below the table's top; it must stand on it")
 
 
 def _read_path(

@@ -1,4 +1,4 @@
-"""A scan of a mesh that somebody brings: what is assumed of it, as a scan and as the text of a scan file."""
+"""A draft scan of a new mesh: the assumptions about it, as a scan and as the text of a scan file."""
 
 import json
 import math
@@ -31,28 +31,28 @@ TURN_TO_UP = {
     "y": (0.0, -90.0, -90.0),
     "-y": (0.0, -90.0, 90.0),
 }
-"""Yaw, pitch and roll in degrees that turn an axis of a mesh file upwards."""
+"""Yaw, pitch and roll in degrees that rotate an axis of a mesh file upward."""
 
 FIRST_PATTERN = {"block": "raster", "cylinder": "rings", "mould": "raster", "sphere": "meridians"}
 
 _FASTEST_MM_S = 30.0
-# A ring has to be undone by the table, whose limit is 40 deg/s.
+# The table has to compensate the rotation of a ring; its limit is 40 deg/s.
 _FASTEST_RAD_S = math.radians(23.0)
 _STEP_S, _SHORTEST_STEP_S, _LONGEST_STEP_S = 0.5, 0.2, 1.2
-_FEWEST, _MOST = 40, 250  # locations: fewer leave holes between looks at the map, more take long to plan
+_FEWEST, _MOST = 40, 250  # locations: fewer leave gaps between samples of the map, more take long to plan
 _BOTTOM_MARGINS_MM = 60.0, 90.0, 120.0, 150.0
 _POLAR_ENDS_DEG = 85.0, 65.0, 45.0
 
 
 @dataclass(frozen=True)
 class Part:
-    """A mesh, and how it is placed.
+    """A mesh and its placement.
 
     Attributes:
-        mesh: Its surface in the frame of its file, in mm.
-        file: Where it was read.
-        unit: The unit of the file, one of `MILLIMETERS`.
-        up: The axis of the file that points up, one of `TURN_TO_UP`.
+        mesh: its surface in the frame of its file, in mm.
+        file: its file.
+        unit: unit of the file, one of `MILLIMETERS`.
+        up: axis of the file that points up, one of `TURN_TO_UP`.
     """
 
     mesh: trimesh.Trimesh
@@ -62,7 +62,10 @@ class Part:
 
     @property
     def placement(self) -> tuple[float, ...]:
-        """The placement on the table, x y z yaw pitch roll: its middle on the axis, its lowest point on the top."""
+        """The placement on the table, x y z yaw pitch roll.
+
+        The part's middle is on the axis, its lowest point on the top.
+        """
         turned = np.asarray(self.mesh.vertices) @ placement(0.0, 0.0, 0.0, *TURN_TO_UP[self.up])[:3, :3].T
         lower, upper = turned.min(axis=0), turned.max(axis=0)
         x, y = -0.5 * (lower + upper)[:2]
@@ -75,7 +78,7 @@ class Part:
 
     @property
     def kind(self) -> PartClass:
-        """The class that the part is nearest to as it stands."""
+        """The class that is nearest to the part in this orientation."""
         standing = self.mesh.copy()
         standing.apply_transform(placement(*self.placement))
         return part_class(standing)
@@ -86,12 +89,12 @@ class Draft:
     """A scan of a part: a pattern with its keys.
 
     Attributes:
-        part: The part.
-        kind: Its class.
-        pattern: The pattern of that class.
-        keys: Keys of `[path]` that are not at their defaults, by name.
-        speed_mm_s: The speed of the line over the surface.
-        step_s: Time from one location to the next.
+        part: the part.
+        kind: its class.
+        pattern: the pattern of that class.
+        keys: keys of `[path]` that differ from their defaults, by name.
+        speed_mm_s: speed of the line over the surface.
+        step_s: time from one location to the next.
     """
 
     part: Part
@@ -105,17 +108,17 @@ class Draft:
         """Return the path.
 
         Raises:
-            PlannerError: The pattern cannot be laid on the part.
+            PlannerError: the pattern cannot be applied to the part.
         """
         cell, layout = self.part.cell, StripLayout(**dict(self.keys))
         waypoints = mesh_waypoints(self.part.mesh, self.kind, self.pattern, cell.T_TW, cell.probe, layout)
         return at_scan_speed(waypoints, self.speed_mm_s, self.step_s, cell.probe.stand_off_mm, cell.probe.line_width_mm)
 
     def scan(self, name: str) -> Scan:
-        """Return the scan that `text` describes.
+        """Return the scan described by `text`.
 
         Raises:
-            PlannerError: The pattern cannot be laid on the part, or the part does not fit the table.
+            PlannerError: the pattern cannot be applied to the part, or the part does not fit the table.
         """
         cell, limits = self.part.cell, Limits()
         check_it_fits_the_table(self.part.mesh, cell)
@@ -133,14 +136,14 @@ class Draft:
         )
 
     def text(self, folder: Path) -> str:
-        """Return the scan file, commented, for a folder."""
+        """Return the text of the commented scan file, for a folder."""
         part, cell, limits = self.part, self.part.cell, Limits()
         mesh = json.dumps(_relative(part.file.resolve(), folder.resolve()).as_posix())
         x, y, z = (float(side) for side in part.mesh.extents)
         unit = [] if part.unit == "mm" else [("unit", json.dumps(part.unit), "of the lengths in the mesh file")]
         sections: dict[str, list[tuple[str, str, str]]] = {
             "cell": [
-                ("arm", json.dumps(DEFAULT_ARM), "the cell of the shipped scans, an estimate: write yours here"),
+                ("arm", json.dumps(DEFAULT_ARM), "the cell of the shipped scans, an estimate: enter your cell here"),
                 ("table_in_base", _list(*cell.T_BT[:3, 3], 0, 0, 0), "middle of the table top, its axis upright"),
                 ("probe_on_flange", _list(*cell.T_FS[:3, 3], 0, 0, 0), "the beam continues the axis of joint 6"),
                 ("workpiece_on_table", _list(*part.placement), "middle on the table's axis, lowest point on the top"),
@@ -152,7 +155,7 @@ class Draft:
                 ("line_width_mm", f"{cell.probe.line_width_mm:g}", "width of the laser line at the stand-off"),
             ],
             "workpiece": [
-                ("mesh", mesh, "the way there from this file"),
+                ("mesh", mesh, "path relative to this file"),
                 *unit,
                 ("class", json.dumps(self.kind), _CLASSES),
             ],
@@ -187,16 +190,16 @@ _COMMENT_COLUMN = 46
 
 
 def _section(name: str, rows: list[tuple[str, str, str]]) -> str:
-    """Return a table of a TOML file: a line for each key, value and comment."""
+    """Return a table of a TOML file: one line for each key, value and comment."""
     lines = [f"{key} = {value}".ljust(_COMMENT_COLUMN) + f"  # {comment}" for key, value, comment in rows]
     return "\n".join(("", f"[{name}]", *lines, ""))
 
 
 def drafts(part: Part, kind: str | None = None, pattern: str | None = None) -> Iterator[Draft]:
-    """Yield scans of a part, the one that fits best first; `kind` and `pattern` are what was asked for.
+    """Yield scans of a part, best fit first; `kind` and `pattern` are the requested values, if any.
 
     Raises:
-        PlannerError: What was asked for cannot be laid on the part.
+        PlannerError: the requested pattern cannot be applied to the part.
     """
     first = kind or part.kind.kind
     if pattern is not None:
@@ -204,7 +207,7 @@ def drafts(part: Part, kind: str | None = None, pattern: str | None = None) -> I
     else:
         kinds = [(first, FIRST_PATTERN[first])]
         if kind is None:
-            # From above everything can be scanned in some way.
+            # Every part can be scanned from above in some way.
             kinds += [(other, FIRST_PATTERN[other]) for other in ("block", "cylinder", "sphere") if other != first]
     for each, laid in kinds:
         for keys in _layouts(each, part):
@@ -229,13 +232,13 @@ def _layouts(kind: str, part: Part) -> Iterator[tuple[tuple[str, float], ...]]:
 
 
 def _speed_mm_s(part: Part) -> float:
-    """Return a speed at which the table can undo a turn around the part."""
+    """Return a speed at which the table can compensate a rotation around the part."""
     length_mm, width_mm, _ = sorted(part.mesh.extents, reverse=True)
     return float(f"{min(_FASTEST_MM_S, _FASTEST_RAD_S * 0.25 * (length_mm + width_mm)):.2g}")
 
 
 def _timed(draft: Draft) -> Draft:
-    """Return the draft with a time step, and if need be a lower speed, that give neither few locations nor many."""
+    """Return the draft with a time step, and a lower speed if necessary, for a moderate number of locations."""
     duration_s = (draft.path().count - 1) * draft.step_s
     step_s = min(max(_STEP_S, duration_s / _MOST), _LONGEST_STEP_S, max(duration_s / _FEWEST, _SHORTEST_STEP_S))
     slower = min(1.0, duration_s / (_FEWEST * step_s))
@@ -243,7 +246,7 @@ def _timed(draft: Draft) -> Draft:
 
 
 def _relative(file: Path, folder: Path) -> Path:
-    """Return the way from a folder to a file; the whole path where there is none, as between two drives."""
+    """Return the relative path from a folder to a file, or the absolute path if there is none (two drives)."""
     try:
         return Path(os.path.relpath(file, folder))
     except ValueError:

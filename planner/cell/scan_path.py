@@ -1,4 +1,4 @@
-"""A scan path: where the probe must be, as one pose per location in the workpiece frame, at a constant time step."""
+"""A scan path: the required poses of the probe in the workpiece frame, one per location, at a constant time step."""
 
 import csv
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from planner.geometry.transforms import first_not_rigid, from_xyz_yaw_pitch_roll
 from protocol.data_file import DataFileError, read_json, read_text, shown
 
 MOST_LOCATIONS = 20_000
-"""Beyond any path that can be meant: a day at one location every 4 s."""
+"""More than any useful path: a day at one location every 4 s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,11 +21,11 @@ class ScanPath:
     """Scan locations and the time between two of them.
 
     Attributes:
-        T_WS: Probe poses in the workpiece frame, T_L in the paper, `(n, 4, 4)` in mm.
-        step_s: Time from one location to the next.
+        T_WS: poses of the probe in the workpiece frame, T_L in the paper, `(n, 4, 4)` in mm.
+        step_s: time from one location to the next.
 
     Raises:
-        PathError: Fewer than two locations, one that is not rigid, or a step that is not above 0.
+        PathError: fewer than two locations, a pose that is not rigid, or a step that is not above 0.
     """
 
     T_WS: FloatArray
@@ -33,7 +33,7 @@ class ScanPath:
 
     def __post_init__(self) -> None:
         if len(self.T_WS) < 2:
-            raise PathError(f"the path has {len(self.T_WS)} location(s); it must have at least 2")
+            raise PathError(f"the number of locations of the path is {len(self.T_WS)}; it must be at least 2")
         if not 0.0 < self.step_s < np.inf:
             raise PathError(f"the path's time step is {self.step_s:g} s; it must be above 0")
         fault = first_not_rigid(self.T_WS)
@@ -47,13 +47,13 @@ class ScanPath:
 
 
 def looking_at(points: FloatArray, normals: FloatArray, lines: FloatArray, stand_off_mm: float) -> FloatArray:
-    """Return probe poses `(n, 4, 4)` at p + stand-off n that look along -n.
+    """Return poses of a probe `(n, 4, 4)` at p + stand-off n with the beam along -n.
 
     Args:
-        points: Surface points p, `(n, 3)` in mm.
-        normals: Unit normals n that point out of the surface, `(n, 3)`.
-        lines: Directions of the laser line, `(n, 3)`; only the part across the normal counts.
-        stand_off_mm: Distance of the probe from p.
+        points: points p on the surface, `(n, 3)` in mm.
+        normals: outward unit normals n, `(n, 3)`.
+        lines: directions of the laser line, `(n, 3)`; only the component perpendicular to the normal counts.
+        stand_off_mm: distance of the probe from p.
     """
     T = np.tile(np.eye(4), (len(points), 1, 1))
     beam = -normals
@@ -68,11 +68,11 @@ def looking_at(points: FloatArray, normals: FloatArray, lines: FloatArray, stand
 def at_scan_speed(
     waypoints: FloatArray, speed_mm_s: float, step_s: float, stand_off_mm: float, line_width_mm: float
 ) -> ScanPath:
-    """Return the path through `waypoints` `(n, 4, 4)` whose line moves over the surface at one speed.
+    """Return the path through `waypoints` `(n, 4, 4)` along which the line moves over the surface at constant speed.
 
-    The speed is that of the fastest of the line's middle and ends, so that a turn on the spot takes its time too.
-    All steps are equal and the last one ends at the last waypoint: for that the speed gives way, by less than half a
-    step over the whole path.
+    This is the maximum speed of the line's middle and ends, so a rotation on the spot takes time too. All steps are
+    equal, and the last one ends at the last waypoint. Therefore the speed is adjusted, by less than half a step over
+    the whole path.
     """
     line = 0.5 * line_width_mm
     marks = np.array([[-line, 0, stand_off_mm, 1], [0, 0, stand_off_mm, 1], [line, 0, stand_off_mm, 1]])
@@ -85,11 +85,11 @@ def at_scan_speed(
     if not steps < MOST_LOCATIONS:
         raise PathError(
             f"a path of {travelled[-1]:.0f} mm at scan_speed_mm_s {speed_mm_s:g} with time_step_s {step_s:g} has"
-            f" {steps:.3g} locations; at most {MOST_LOCATIONS:,} are allowed: scan faster, or in longer steps"
+            f" {steps:.3g} locations; at most {MOST_LOCATIONS:,} are allowed; increase the speed or the time step"
         )
     count = max(2, 1 + round(steps))
     if len(waypoints) < 2:
-        raise PathError("the path does not move; it must have at least 2 different locations")
+        raise PathError("all locations of the path are equal; it must have at least 2 different locations")
     at = np.linspace(0.0, travelled[-1], count)
     T = np.tile(np.eye(4), (count, 1, 1))
     T[:, :3, :3] = Slerp(travelled, Rotation.from_matrix(waypoints[:, :3, :3]))(at).as_matrix()
@@ -99,14 +99,14 @@ def at_scan_speed(
 
 
 def load_scan_path(file: Path, step_s: float) -> ScanPath:
-    """Return the path of a CSV or JSON file of poses.
+    """Return the path from a CSV or JSON file of poses.
 
-    A pose is six numbers, x y z in mm and yaw pitch roll in degrees, or the sixteen of a 4 x 4 matrix by rows. A CSV
-    file has one pose a line, after an optional line of headings. A JSON file is a list of poses, where a matrix may
-    also be a list of its rows.
+    A pose is six numbers, x y z in mm and yaw pitch roll in degrees. It may also be the sixteen numbers of a 4 x 4
+    matrix by rows. A CSV file has one pose per line, after an optional header line. A JSON file is a list of poses,
+    where a matrix may also be a list of its rows.
 
     Raises:
-        PathError: The file cannot be read, or a pose is not six or sixteen finite numbers, or not rigid.
+        PathError: the file cannot be read, or a pose is not six or sixteen finite numbers, or not rigid.
     """
     kinds = {".csv": _rows_of_csv, ".json": _rows_of_json}
     if file.suffix.lower() not in kinds:

@@ -1,6 +1,7 @@
-"""Guess whether lengths or angles of a scan are in another unit, for when nothing of it can be reached.
+"""Detect lengths or angles of a scan that may be in another unit, for a scan in which nothing can be reached.
 
-Nothing is refused for it: a placement of 2 mm can be meant. It is the likely cause when every cell is forbidden.
+Nothing is refused because of it: a placement of 2 mm may be intended. A wrong unit is the likely cause when every cell
+is forbidden.
 """
 
 from collections.abc import Iterator
@@ -11,16 +12,16 @@ from scipy.spatial.transform import Rotation
 from planner.arrays import FloatArray
 from planner.cell.scan import Scan
 
-# Placements of a cell and paths around a part are longer than this in mm; in meters they are shorter.
+# Placements of a cell and paths around a part are longer than this in mm, and shorter in meters.
 _SHORT_MM = 5.0
-# In degrees these turns are unusual, in radians they are quarters of a turn and halves of it.
+# In degrees these rotations are unusual; in radians they are quarter and half turns.
 _QUARTER_RAD, _NEAR = np.pi / 4.0, 2e-3
-# Probe directions of a path that looks at a part from all sides differ by more than this.
+# The beam directions of a path around a part differ by more than this.
 _ALIKE_DEG = 10.0
 
 
 def unit_hint(scan: Scan) -> str | None:
-    """Return one sentence that names what looks like meters or radians, or None."""
+    """Return one sentence that names the values that may be meters or radians, or None."""
     found = list(_suspects(scan))
     return "; ".join(found) + "? Lengths are in mm and angles in deg." if found else None
 
@@ -46,5 +47,5 @@ def _suspects(scan: Scan) -> Iterator[str]:
 
 
 def _turns_deg(T: FloatArray) -> FloatArray:
-    """Return by which angle each pose `(n, 4, 4)` is turned."""
+    """Return the rotation angle of each pose `(n, 4, 4)`."""
     return np.asarray(np.degrees(Rotation.from_matrix(T[:, :3, :3]).magnitude()))

@@ -1,7 +1,7 @@
 """The workpiece: its class with approximate dimensions, and its mesh.
 
-A class is what the predefined patterns of Fig. 2 need; it is given, or measured off a mesh. Frame W has its z axis
-up; a workpiece of given dimensions stands on z = 0 with its middle on the axis, a mesh where its file puts it.
+The predefined patterns of Fig. 2 need a class. It is given, or derived from a mesh. Frame W has its z axis up. A
+workpiece of given dimensions stands on z = 0 with its middle on the axis. A mesh is placed as in its file.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from planner.errors import WorkpieceError
 
 @dataclass(frozen=True)
 class Sphere:
-    """A sphere that touches the plane of its base from above."""
+    """A sphere that stands on the plane of its base."""
 
     diameter_mm: float
     middle_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -55,7 +55,7 @@ class Cylinder:
 
     @classmethod
     def measured(cls, mesh: trimesh.Trimesh) -> "Cylinder":
-        """Return the upright cylinder about the mesh's bounding box, as wide as its wider side."""
+        """Return the upright cylinder with the height of the mesh's bounding box and the diameter of its wider side."""
         (width, depth, height), middle = _box(mesh)
         return cls(max(width, depth), height, middle)
 
@@ -94,7 +94,7 @@ class Mould:
         ]
         corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
         vertices = [(sx * length, sy * width, z) for length, width, z in rings for sx, sy in corners]
-        # Each ring is joined to the next by four rectangles; bottom and cavity floor close the ends.
+        # Each ring is connected to the next by four rectangles; bottom and cavity floor close the ends.
         quads = [
             (4 * ring + i, 4 * ring + (i + 1) % 4, 4 * ring + 4 + (i + 1) % 4, 4 * ring + 4 + i)
             for ring in range(3)
@@ -106,10 +106,10 @@ class Mould:
 
     @classmethod
     def measured(cls, mesh: trimesh.Trimesh) -> "Mould":
-        """Return the mould of the mesh's bounding box; the cavity is felt out by rays from above its middle.
+        """Return the mould with the mesh's bounding box; rays from above its middle measure the cavity.
 
         Raises:
-            WorkpieceError: There is no cavity in the middle of the top.
+            WorkpieceError: there is no cavity in the middle of the top.
         """
         (length, width, height), middle = _box(mesh)
         x, y, z = middle
@@ -160,6 +160,6 @@ def _box(mesh: trimesh.Trimesh) -> tuple[tuple[float, float, float], tuple[float
 
 
 def _first_hit(mesh: trimesh.Trimesh, origin: tuple[float, ...], direction: tuple[float, ...]) -> float:
-    """Return the distance along a ray to the mesh, infinite where it misses."""
+    """Return the distance along a ray to the mesh, infinity if it misses."""
     hits, _, _ = mesh.ray.intersects_location([origin], [direction])
     return float(np.linalg.norm(hits - origin, axis=1).min()) if len(hits) else np.inf

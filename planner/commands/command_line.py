@@ -1,4 +1,4 @@
-"""The command line of `python -m planner`: what can be asked, read without loading what carries it out."""
+"""The command line of `python -m planner`, parsed without loading the code of the commands."""
 
 import argparse
 import math
@@ -33,7 +33,7 @@ REPORT_FILE = "report.html"
 
 
 def parser() -> Parser:
-    """Return the parser; what it returns has the name of its command in `command`."""
+    """Return the parser; its result has the name of the command in `command`."""
     top = Parser(
         prog=program_name("planner"),
         description="Plan the motion of a rotary table under a scanning robot arm.",
@@ -250,17 +250,17 @@ def _angle(text: str) -> float:
     except ValueError:
         angle = math.nan
     if not math.isfinite(angle):
-        raise argparse.ArgumentTypeError(f"is {text}; allowed is any angle in degrees")
+        raise argparse.ArgumentTypeError(f"is {text}; allowed: any angle in degrees")
     return angle
 
 
 def _add_scan_option(parser: argparse.ArgumentParser) -> None:
-    """Add the scan that the command is about."""
+    """Add the argument for the scan."""
     parser.add_argument("scan", metavar="SCAN", help=f"a scan file, or one of {', '.join(shipped_scans())}")
 
 
 def _add_map_option(parser: argparse.ArgumentParser, configuration: str) -> None:
-    """Add which configuration maps to compute, and how finely; `configuration` is the default."""
+    """Add the options for the configuration maps to compute and their resolution; `configuration` is the default."""
     parser.add_argument(
         "--configuration",
         metavar="NAME",
@@ -314,7 +314,7 @@ def _add_run_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_wire(parser: argparse.ArgumentParser) -> None:
-    """Add what the line to the table is like."""
+    """Add the options of the serial line."""
     parser.add_argument(
         "--baud", type=whole_number(0, 1_000_000), default=9600, metavar="N", help="baud rate (default: 9600)"
     )
@@ -328,18 +328,18 @@ def _add_wire(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_run_on(parser: argparse.ArgumentParser) -> None:
-    """Add how far the table may run on when the line dies."""
+    """Add the option for the distance that the table may run on if the line fails."""
     parser.add_argument(
         "--run-on",
         type=positive_number,
         default=RUN_ON_DEG,
         metavar="DEG",
-        help="maximum angle that the table runs on if the line dies, where the limits allow it (default: %(default)g)",
+        help="maximum angle that the table runs on if the line fails, if the limits allow it (default: %(default)g)",
     )
 
 
 def _add_emulator(parser: argparse.ArgumentParser) -> None:
-    """Add time scale and control channel of an emulator at the port."""
+    """Add the time scale and the control channel of an emulator at the port."""
     parser.add_argument(
         "--time-scale",
         type=positive_number,
@@ -356,7 +356,7 @@ def _add_emulator(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_lag(parser: argparse.ArgumentParser) -> None:
-    """Add the encoder's lag behind the reference, which the wire does not show."""
+    """Add the lag of the encoder behind the reference, which is not visible on the serial line."""
     parser.add_argument(
         "--lag", type=number(0.0, 1.0), default=LAG_S, metavar="S",
         help="lag of the encoder behind the table's reference in s (default: %(default)s, for the emulator)",

@@ -1,4 +1,4 @@
-"""`python -m planner map`: compute a scan's configuration maps, draw them, and say what can be reached."""
+"""`python -m planner map`: compute a scan's configuration maps, draw them, and print what can be reached."""
 
 import argparse
 import sys
@@ -23,7 +23,7 @@ MAP_RESULTS = (MAP_FILE, "map.png", "map_cylinder.png")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write `map.npz`, `map.png` and `map_cylinder.png`, print what can be reached, and return the exit status."""
+    """Write `map.npz`, `map.png` and `map_cylinder.png`, print a summary, and return the exit status."""
     set_aside(arguments.out, MAP_RESULTS)
     configurations = (
         list(Configuration) if arguments.configuration == "all" else [Configuration.parse(arguments.configuration)]
@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
         plot_map(maps[drawn], out / "map.png")
         plot_map_cylinder(maps[drawn], out / "map_cylinder.png")
     except OSError as error:
-        raise PlannerError(f"{out}: the map cannot be written there ({error.strerror or error})") from error
+        raise PlannerError(f"{out}: cannot write the map ({error.strerror or error})") from error
     sys.stdout.write(summary(problem.name, maps, drawn))
     if not any(each.allowed.any() for each in maps.values()) and (hint := unit_hint(scan)) is not None:
         sys.stdout.write(f"nothing can be reached: {hint}\n")
@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def most_reachable(maps: Mapping[Configuration, ConfigurationMap]) -> Configuration:
-    """Return the configuration in which most locations can be reached, of equals the one with the best values."""
+    """Return the configuration in which most locations can be reached; of equal ones, that with the best values."""
 
     def merit(configuration: Configuration) -> tuple[int, float]:
         each = maps[configuration]
@@ -58,7 +58,7 @@ def most_reachable(maps: Mapping[Configuration, ConfigurationMap]) -> Configurat
 
 
 def summary(name: str, maps: Mapping[Configuration, ConfigurationMap], drawn: Configuration) -> str:
-    """Return what the maps say about the path, a line for each configuration."""
+    """Return a summary of the maps, one line for each configuration."""
     shape = maps[drawn]
     lines = [
         f"{name}: {shape.location_count} locations, {shape.angle_count} table angles",
@@ -75,6 +75,6 @@ def summary(name: str, maps: Mapping[Configuration, ConfigurationMap], drawn: Co
 
 
 def _ranges(numbers: Sequence[int]) -> str:
-    """Return ascending numbers with runs drawn together: 1-3, 7."""
+    """Return ascending numbers with consecutive ones as ranges: 1-3, 7."""
     runs = [[number for _, number in run] for _, run in groupby(enumerate(numbers), lambda item: item[1] - item[0])]
     return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)

@@ -16,18 +16,18 @@ from planner.commands import options
 from planner.defaults import DEFAULT_ANGLES, DEFAULT_PLANNER, TOLERANCE_DEG
 from planner.errors import PlannerError, WorkpieceError
 from planner.geometry.mesh import load_mesh
-from planner.planning.arm_motion import ArmMotion
-from planner.planning.plan import Plan
 from planner.planning.planners import PLANNERS
-from planner.planning.problem import Problem
 from planner.planning.scan_planning import ScanPlans, plan_scan
-from planner.planning.verification import verify
+from planner.plans.arm_motion import ArmMotion
+from planner.plans.plan import Plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
 from protocol.progress import progress_line
 from protocol.whole_file import write_whole
 
-# A table that is beside its plan by as much as a run allows, and a little more, must still meet nothing forbidden.
+# At a deviation of the table as large as allowed in a run, plus a margin, nothing forbidden may be touched.
 _OFF_DEG = TOLERANCE_DEG + 0.05
-# A pattern at whose locations more of the beams meet nothing is tried last.
+# A pattern with a larger share of beams without a measurement is tried last.
 _FEW_MISSES = 0.1
 
 
@@ -39,10 +39,10 @@ class Drafted(NamedTuple):
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the scan file, print what was assumed, and return the exit status."""
+    """Write the scan file, print the assumptions, and return the exit status."""
     out: Path = arguments.out or Path(f"{arguments.mesh.stem}.toml")
     if out.exists():
-        raise PlannerError(f"{out}: exists already; remove it, or write to another file with --out")
+        raise PlannerError(f"{out}: already exists; remove it, or choose another file with --out")
     mesh = load_mesh(arguments.mesh, arguments.unit, options.say, progress_line("mesh", sys.stderr))
     part = Part(mesh, arguments.mesh, arguments.unit or "mm", arguments.up)
     try:
@@ -54,18 +54,18 @@ def run(arguments: argparse.Namespace) -> int:
         out.parent.mkdir(parents=True, exist_ok=True)
         write_whole(out, drafted.draft.text(out.parent))
     except OSError as error:
-        raise PlannerError(f"{out}: the scan cannot be written there ({error.strerror or error})") from error
+        raise PlannerError(f"{out}: cannot write the scan ({error.strerror or error})") from error
     sys.stdout.write(summary(drafted, out))
     return 0
 
 
 def first_that_plans(part: Part, kind: str | None, pattern: str | None, name: str) -> Drafted:
-    """Return the first scan of a part that has a plan which the arm can follow, with room beside it.
+    """Return the first scan of a part with a plan that the arm can follow, including a margin.
 
-    Patterns that measure something at nearly all of their locations come first.
+    Patterns that measure at nearly all of their locations are tried first.
 
     Raises:
-        WorkpieceError: There is none.
+        WorkpieceError: there is none.
     """
     reasons = []
     for draft in sorted(drafts(part, kind, pattern), key=lambda each: share_missed(each) > _FEW_MISSES):
@@ -84,19 +84,19 @@ def first_that_plans(part: Part, kind: str | None, pattern: str | None, name: st
         reasons.append(f"{draft.pattern}{_layout(draft)}: {reason}")
     tried = "; ".join(reasons) or "no pattern meets the part"
     raise WorkpieceError(
-        f"no pattern can be scanned in the default cell ({tried}); name a --pattern, turn the part with --up,"
+        f"no pattern can be scanned in the default cell ({tried}); choose a --pattern, rotate the part with --up,"
         " or write a path file, see docs/own-part.md"
     )
 
 
 def share_missed(draft: Draft) -> float:
-    """Return the share of locations at which nothing can be measured."""
+    """Return the share of locations without a measurement."""
     faults = beam_faults(draft.path().T_WS, draft.part.mesh, draft.part.cell.probe)
     return float(np.mean(faults.away | faults.misses | faults.beyond))
 
 
 def has_room(problem: Problem, plan: Plan, arm: ArmMotion) -> bool:
-    """Return whether the arm can follow, and nothing forbidden is met where the table is a little beside its plan."""
+    """Return whether the arm can follow, and whether small deviations of the table touch nothing forbidden."""
     beside = (replace(plan, angles_deg=plan.angles_deg + off_deg) for off_deg in (-_OFF_DEG, 0.0, _OFF_DEG))
     return arm.step is None and all(verify(problem, each).is_executable for each in beside)
 
@@ -106,7 +106,7 @@ def _layout(draft: Draft) -> str:
 
 
 def summary(drafted: Drafted, out: Path) -> str:
-    """Return what was written, what was assumed, and what to do next, for people."""
+    """Return the written file, the assumptions, and the next step, as text."""
     draft, part = drafted.draft, drafted.draft.part
     assert drafted.plans.best is not None
     problem, plan = drafted.plans.best.problem, drafted.plans.best.plan
@@ -117,8 +117,8 @@ def summary(drafted: Drafted, out: Path) -> str:
         f"{out}: {part.kind.name}, {x:.1f} x {y:.1f} x {z:.1f} mm; pattern {draft.pattern}{_layout(draft)} on the class"
         f" {draft.kind}, {problem.map.location_count} locations, {problem.step_count * problem.step_s:g} s",
         f"assumed: lengths in {part.unit} (--unit)",
-        f"         the file's {part.up} axis points up (--up)",
-        "         the part stands in the middle of the table: workpiece_on_table ="
+        f"         axis {part.up} of the file points up (--up)",
+        "         the part is in the middle of the table: workpiece_on_table ="
         f" [{', '.join(f'{value:.10g}' for value in placed)}]",
         f"         arm {cell.arm.name} and the cell of the shipped scans (arm, table_in_base, probe_on_flange)",
         f"         stand-off {cell.probe.stand_off_mm:g} mm, measuring range {cell.probe.nearest_mm:g} to"

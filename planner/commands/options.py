@@ -1,10 +1,10 @@
-"""What several commands make of their options."""
+"""Helpers for options of several commands."""
 
 import sys
 
 
 def fresh_table(url: str, **wanted: int) -> str:
-    """Return a port's URL; a table that `emulator://` makes gets what is wanted, unless told others."""
+    """Return the URL of a port. For `emulator://`, add the wanted settings unless the URL has its own."""
     if not url.startswith("emulator://"):
         return url
     told = url.partition("?")[2]
@@ -13,5 +13,5 @@ def fresh_table(url: str, **wanted: int) -> str:
 
 
 def say(line: str) -> None:
-    """Print a line for people beside the command's results, such as what was mended in a mesh."""
+    """Print a line for the user besides the results of the command, such as repairs of a mesh."""
     sys.stderr.write(line + "\n")

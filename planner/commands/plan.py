@@ -1,4 +1,4 @@
-"""`python -m planner plan`: choose the table's motion along a scan, write it down, and say how good it is."""
+"""`python -m planner plan`: choose the table's motion along a scan, write it, and print its quality."""
 
 import argparse
 import sys
@@ -14,22 +14,22 @@ from planner.commands import options
 from planner.errors import PlannerError
 from planner.execution.run_file import RUN_RESULTS
 from planner.map.map_file import MAP_FILE
-from planner.planning.arm_motion import ArmMotion, arm_follows
-from planner.planning.arm_plots import plot_arm
 from planner.planning.own_planners import planner_named, planner_names
-from planner.planning.plan import NoPlan, Outcome, Plan, Planner
-from planner.planning.plan_file import PLAN_FILE
-from planner.planning.plan_plots import plot_plan
-from planner.planning.problem import Problem
 from planner.planning.scan_planning import PlannedScan, plan_scan
 from planner.planning.smoothing import smooth
-from planner.planning.verification import verify
+from planner.plans.arm_motion import ArmMotion, arm_follows
+from planner.plans.arm_plots import plot_arm
+from planner.plans.plan import NoPlan, Outcome, Plan, Planner
+from planner.plans.plan_file import PLAN_FILE
+from planner.plans.plan_plots import plot_plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
 from planner.plug_ins import PlugInError
 from planner.set_aside import set_aside
 from protocol.progress import progress_line
 
 _NO_PLAN = 1
-# A run belongs to its plan: beside another plan it would pass for a run of that.
+# A run belongs to its plan: beside another plan, it would be taken for a run of that plan.
 PLAN_RESULTS = (PLAN_FILE, "plan.png", "arm.png", MAP_FILE, *RUN_RESULTS)
 
 
@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def smoothed(planner: Planner) -> Planner:
-    """Return the planner followed by smoothing, unless that makes a plan that the arm cannot follow."""
+    """Return the planner followed by smoothing, unless the smoothed plan cannot be followed by the arm."""
 
     def plan(problem: Problem) -> Outcome:
         outcome = planner(problem)
@@ -75,7 +75,7 @@ def smoothed(planner: Planner) -> Planner:
 
 
 def timed(planner: Planner) -> Planner:
-    """Return the planner with its plans' computing time filled in; the first call, which may compile, is left out."""
+    """Return the planner with the computing time in its plans. The first call may compile and is not timed."""
 
     def plan(problem: Problem) -> Outcome:
         if isinstance(no_plan := planner(problem), NoPlan):
@@ -89,12 +89,12 @@ def timed(planner: Planner) -> Planner:
 
 
 def configuration_line(label: str, outcome: Outcome) -> str:
-    """Return what came out for one arm configuration."""
+    """Return the result for one arm configuration."""
     return f"{label:20} {outcome.reason if isinstance(outcome, NoPlan) else f'cost {outcome.cost.total:.3f}'}\n"
 
 
 def report(planned: PlannedScan) -> str:
-    """Return cost, time and margins of a plan, for people."""
+    """Return cost, time and margins of a plan, as text."""
     problem, plan, checked = planned.problem, planned.plan, planned.verification
     cost = plan.cost
     lines = [
@@ -120,7 +120,7 @@ def _arm_verdict(motion: ArmMotion) -> str:
 
 
 def _arm_lines(motion: ArmMotion) -> list[str]:
-    """Return the turns at the start of the joints that have more than one, and what is left of each joint's limits."""
+    """Return the start turns of the joints that have more than one turn, and the remaining range of each joint."""
     ranges_deg = np.subtract(motion.arm.upper_deg, motion.arm.lower_deg)
     turns = [
         f"joint {j + 1} at {motion.robot_deg[0, j]:.1f} deg (turn {motion.start_turns[j]:+d})"
@@ -132,13 +132,13 @@ def _arm_lines(motion: ArmMotion) -> list[str]:
         ("  speed, deg/s", [f"{margin:.1f}" for margin in motion.speed_margins_deg_s]),
     )
     return [
-        f"start turns   {', '.join(turns) or 'no joint has more than one'}",
+        f"start turns   {', '.join(turns) or 'no joint has more than one turn'}",
         *(f"{name:14}" + "".join(f"{text:>9}" for text in texts) for name, texts in rows),
     ]
 
 
 def compared(name: str, problem: Problem) -> Outcome | PlugInError:
-    """Return what a planner answers; a plug-in that is broken keeps no other planner from answering."""
+    """Return the result of a planner. A broken plug-in does not prevent the results of other planners."""
     try:
         return timed(planner_named(name))(problem)
     except PlugInError as error:
@@ -146,7 +146,7 @@ def compared(name: str, problem: Problem) -> Outcome | PlugInError:
 
 
 def comparison_table(problem: Problem, outcomes: Mapping[str, Outcome | PlugInError]) -> str:
-    """Return a line for each planner: cost, violations, pauses and time, all from the same start."""
+    """Return a line for each planner: cost, violations, pauses and time, all from the same start angle."""
     lines = [f"{'planner':20} {'cost':>10} {'forbidden steps':>15} {'within limits':>13} {'pauses':>6} {'ms':>9}  arm"]
     for name, outcome in outcomes.items():
         if isinstance(outcome, NoPlan | PlugInError):
@@ -169,4 +169,4 @@ def _write(out: Path, planned: PlannedScan) -> None:
         plot_plan(planned.problem, planned.plan, title, out / "plan.png")
         plot_arm(planned.arm, title, out / "arm.png")
     except OSError as error:
-        raise PlannerError(f"{out}: the plan cannot be written there ({error.strerror or error})") from error
+        raise PlannerError(f"{out}: cannot write the plan ({error.strerror or error})") from error

@@ -1,4 +1,4 @@
-"""`python -m planner run`: carry out a plan on the table at a port, and prove that it was carried out."""
+"""`python -m planner run`: execute a plan on the table at a port, and verify the motion."""
 
 import argparse
 import sys
@@ -16,7 +16,7 @@ _DEVIATED, _NOT_RUN = 1, 2
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the plan, write what happened, print the verdict, and return the exit status."""
+    """Execute the plan, write the results, print the verdict, and return the exit status."""
     asked = run_options(arguments)
     show = progress_line("run", sys.stderr)
     try:
@@ -24,12 +24,12 @@ def run(arguments: argparse.Namespace) -> int:
     except TableError as error:
         raise PlannerError(str(error)) from error
     except OSError as error:
-        raise PlannerError(f"{arguments.out}: the run cannot be written there ({error.strerror or error})") from error
+        raise PlannerError(f"{arguments.out}: cannot write the run ({error.strerror or error})") from error
     write_report(arguments.out, arguments.out / REPORT_FILE, arguments.command_line)
     sys.stdout.write(summary(checked))
     sys.stderr.write(f"{duration}\n")
     if checked.failure is not None:
-        sys.stderr.write(f"what was recorded until then is in {arguments.out}\n")
+        sys.stderr.write(f"the data recorded so far is in {arguments.out}\n")
     return status_of(checked)
 
 
@@ -58,7 +58,7 @@ def run_options(arguments: argparse.Namespace) -> RunOptions:
 
 
 def summary(checked: RunVerification) -> str:
-    """Return what a run came to, for people."""
+    """Return the results of a run, as text."""
     lines = [checked.verdict]
     for name, each in checked.deviations.items():
         lines.append(
@@ -68,7 +68,7 @@ def summary(checked: RunVerification) -> str:
         f"map        {len(checked.forbidden_steps)} steps touched a forbidden cell; {checked.margin_deg:.2f} deg left",
         f"cost       planned {checked.planned_cost.total:.4f}"
         + (f", executed {checked.executed_cost.total:.4f}" if checked.executed_cost else ""),
-        f"commands   the latest was {1000.0 * checked.latest_command_s:.1f} ms late",
+        f"commands   maximum delay {1000.0 * checked.latest_command_s:.1f} ms",
         f"dead line  {checked.dead_line}",
     ]
     return "\n".join(lines) + "\n"

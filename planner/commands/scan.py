@@ -1,4 +1,4 @@
-"""`python -m planner scan`: carry a scan out with a simulated probe, and compute the error budget of its cloud."""
+"""`python -m planner scan`: perform a scan with a simulated probe, and compute the error budget of its cloud."""
 
 import argparse
 import sys
@@ -26,7 +26,7 @@ SCAN_RESULTS = ("cloud.ply", "cloud.xyz", "normals.ply", "poses.csv", "scan.json
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Scan, write cloud, figures and report, print what it came to, and return the exit status."""
+    """Scan, write cloud, figures and report, print a summary, and return the exit status."""
     if arguments.surface is not None:
         need("gpytoolbox")
         _check_surface_file(arguments.surface)
@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
     except TableError as error:
         raise PlannerError(str(error)) from error
     except OSError as error:
-        raise PlannerError(f"{out}: the scan cannot be written there ({error.strerror or error})") from error
+        raise PlannerError(f"{out}: cannot write the scan ({error.strerror or error})") from error
     sys.stdout.write(summary(scanned))
     return 0 if scanned.is_whole else _INCOMPLETE
 
@@ -96,7 +96,7 @@ def _check_surface_file(file: Path) -> None:
 
 
 def summary(scanned: Scanned) -> str:
-    """Return what a scan came to, for people."""
+    """Return the results of a scan, as text."""
     run, budget = scanned.run, scanned.budget
     mean, sigma, within, greatest = (f"{1e3 * value:.1f}" for value in budget.distances)
     shares = [
@@ -115,7 +115,7 @@ def summary(scanned: Scanned) -> str:
         f"{scanned.scan.name}: {verdict_of(scanned)}",
         f"profiles   {run.triggers} taken, {len(run.dropped)} dropped because a latch was missing",
         f"dead line  {scanned.dead_line}",
-        f"distance   mean {mean}, sigma {sigma}, 95 % within {within}, greatest {greatest} micrometers",
+        f"distance   mean {mean}, sigma {sigma}, 95 % within {within}, maximum {greatest} micrometers",
         f"{'rms, in micrometers':24} {'displacement':>12} {'across':>8} {'without':>8}",
         *(f"  {name:22} {alone:>12} {across:>8} {without:>8}".rstrip() for name, alone, across, without in shares),
     ]

@@ -22,10 +22,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def write_report(folder: Path, page: Path, command: str) -> None:
-    """Write the page of the run in a folder; `command` is the command line that asks for it.
+    """Write the page of the run in a folder; `command` is the command line for the page.
 
     Raises:
-        PlannerError: the folder holds no run, or the page cannot be written.
+        PlannerError: the folder contains no run, or the page cannot be written.
     """
     stored = load_run(folder)
     conditions = stored.conditions
@@ -33,4 +33,4 @@ def write_report(folder: Path, page: Path, command: str) -> None:
     try:
         write_whole(page, run_report(stored, checked, Origin(command)))
     except OSError as error:
-        raise PlannerError(f"{page}: the page cannot be written there ({error.strerror or error})") from error
+        raise PlannerError(f"{page}: cannot write the page ({error.strerror or error})") from error

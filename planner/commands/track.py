@@ -35,12 +35,12 @@ def run(arguments: argparse.Namespace) -> int:
     except TableError as error:
         raise PlannerError(str(error)) from error
     except OSError as error:
-        raise PlannerError(f"{arguments.out}: the run cannot be written there ({error.strerror or error})") from error
+        raise PlannerError(f"{arguments.out}: cannot write the run ({error.strerror or error})") from error
     write_report(arguments.out, arguments.out / REPORT_FILE, arguments.command_line)
     sys.stdout.write(summary(finished.checked) + track_summary(finished))
     sys.stderr.write(f"{finished.duration}\n")
     if finished.checked.failure is not None:
-        sys.stderr.write(f"what was recorded until then is in {arguments.out}\n")
+        sys.stderr.write(f"the data recorded so far is in {arguments.out}\n")
     return status_of(finished.checked)
 
 

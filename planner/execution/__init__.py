@@ -1,1 +1,1 @@
-"""A plan on the table: streamed, watched, corrected, verified and recorded."""
+"""The execution of a plan on the table: streaming, monitoring, correction, verification and recording."""

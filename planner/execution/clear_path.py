@@ -1,4 +1,4 @@
-"""Paths of the table at one scan location: which are clear, and by which the start can be reached."""
+"""Paths of the table at one scan location: find those that are clear and those that reach the start."""
 
 from planner.errors import PlannerError
 from planner.execution.table_motion import Phase, TableMotion
@@ -9,11 +9,11 @@ _TURN_DEG = 360.0
 
 
 class BlockedPathError(PlannerError):
-    """A path of the table that leads through a forbidden region."""
+    """A path of the table through a forbidden region."""
 
 
 def is_clear(configuration_map: ConfigurationMap, location: int, lowest_deg: float, highest_deg: float) -> bool:
-    """Tell whether the table may turn from one angle to another while the probe stays at a location."""
+    """Return whether the table may turn from one angle to another while the probe stays at a location."""
     count = configuration_map.angle_count
     first = sample_at_or_below(lowest_deg / configuration_map.angle_step_deg)
     last = sample_at_or_above(highest_deg / configuration_map.angle_step_deg)
@@ -22,17 +22,17 @@ def is_clear(configuration_map: ConfigurationMap, location: int, lowest_deg: flo
 
 
 def nearest_turns(position_deg: float, start_deg: float) -> int:
-    """Return the full turns to add to a plan so that its start is nearest."""
+    """Return the number of full turns to add to a plan so that its start is nearest."""
     return round((position_deg - start_deg) / _TURN_DEG)
 
 
 def turns_to_start(configuration_map: ConfigurationMap, position_deg: float, start_deg: float) -> int:
-    """Return the full turns to add to a plan so that its start is reached by the shortest clear path.
+    """Return the number of full turns to add to a plan so that the shortest clear path reaches its start.
 
-    Angles do not wrap on the wire: a table that has made two turns stands at 720 degrees and stays there.
+    Angles do not wrap in the protocol: after two turns, the table is at 720 degrees and stays there.
 
     Raises:
-        BlockedPathError: neither path around is clear at the first location.
+        BlockedPathError: no path is clear at the first location.
     """
     nearest = nearest_turns(position_deg, start_deg)
     other = nearest + (1 if start_deg + nearest * _TURN_DEG < position_deg else -1)
@@ -42,12 +42,12 @@ def turns_to_start(configuration_map: ConfigurationMap, position_deg: float, sta
             return turns
     raise BlockedPathError(
         f"the table stands at {position_deg:.1f} deg and the plan starts at {start_deg:.1f}; with the arm at the first"
-        " location both ways there lead through a forbidden region: draw the arm back, and say so with --arm-away"
+        " location both paths to the start cross a forbidden region; retract the arm, and add --arm-away"
     )
 
 
 def check_ends(configuration_map: ConfigurationMap, motion: TableMotion) -> None:
-    """Refuse a motion whose run-up, or whose stop, leads through a forbidden region.
+    """Refuse a motion whose run-up or stop passes through a forbidden region.
 
     Raises:
         BlockedPathError: with the path and the location.
@@ -63,6 +63,6 @@ def check_ends(configuration_map: ConfigurationMap, motion: TableMotion) -> None
         if not is_clear(configuration_map, leg.column, lowest_deg, highest_deg):
             raise BlockedPathError(
                 f"the {leg.phase} at location {leg.column} takes the table from {lowest_deg:.1f} to"
-                f" {highest_deg:.1f} deg, through a forbidden region: plan so that the motion begins and ends slowly,"
-                " or farther from it"
+                f" {highest_deg:.1f} deg, through a forbidden region; plan a motion that starts and ends more slowly,"
+                " or farther from the region"
             )

@@ -1,13 +1,17 @@
-"""The command, and its moment, that bring the reference nearest to the plan in one step, of what the wire can say.
+"""Find the command, and its time, that bring the reference nearest to the plan within one step.
 
-From the command's moment on the reference goes from its present speed v to S at the rate A, and then holds S. Before
-it, it holds v. So in a step it gets farther by (S - v) r than without the command, where r is the time that is left in
-the middle of the ramp: the moment decides where the step ends, as finely as clocks go, though S and A are coarse. A
-ramp in the middle of a step ends like the plan's acceleration all through it, at the same angle and the same speed. So
-A may be greater than the plan's, which keeps the table's run-on short (`run_on`).
+The protocol limits the resolution of the command. From the time of the command on, the reference changes its present
+speed v to S at the rate A, and then keeps S. Before that time, it keeps v.
 
-P only gives the direction, but the controller brakes for it: `with_target` sets it beyond the way to stop, once the
-moment of the next command is known.
+So in a step it travels farther by (S - v) r than without the command. Here r is the time from the middle of the ramp to
+the end of the step. Therefore the time of the command determines the position at the end of the step. Its resolution is
+that of the clock, although S and A are coarse.
+
+A ramp in the middle of a step ends at the same angle and the same speed as the plan's acceleration over the whole step.
+So A may be larger than the plan's, which keeps the table's run-on short (`run_on`).
+
+P only gives the direction, but the controller brakes for it. `with_target` sets P beyond the braking distance, once the
+time of the next command is known.
 """
 
 import math
@@ -20,36 +24,37 @@ from planner.execution.run_on import least_rate
 from planner.table.wire import Grid
 from protocol.trapezoid import MotionCommand, ReferenceState, advance
 
-# A speed below this counts as standing: it is what additions leave of zero.
+# A lower speed counts as standstill: it is a rounding error of sums.
 STANDING_DEG_S = 1e-6
-# What a deg of error at the end of a step is weighed against: half as much in its middle; and the way that an error of
-# the end's speed makes in a third of a step, or in a whole one where the plan leaves no acceleration to make up for it.
+# Weights relative to an error in deg at the end of a step: half for its middle. An error of the final speed counts as
+# its travel within a third of a step. If the plan leaves no acceleration for a correction, it counts as its travel
+# within a whole step.
 _MIDDLE_WEIGHT = 0.5
 _SPEED_WEIGHT, _SPEED_WEIGHT_AT_LIMIT = 0.3, 1.0
-# In the smallest share, the way to brake counts, so that of equals the one is taken which stops soonest; and an A is
-# tried for which that way is short.
+# Small weight for the braking distance, so that among equal commands the one that stops first is chosen; and an A is
+# tried for which this distance is short.
 _BRAKING_WEIGHT = 3e-5
 _SHORT_BRAKING_DEG = 3.0
-# And how much of the speed counts that a ramp is to gain after the step, because the next command breaks it off.
+# Weight of the speed that a ramp would gain after the step: the next command interrupts it.
 _UNFINISHED_SHARE = 0.1
 _SPEEDS = 4
 
 Before = Callable[[float], ReferenceState]
-"""Where the reference is at a time, without a new command."""
+"""Position and speed of the reference at a time, without a new command."""
 
 
 class Step(NamedTuple):
-    """What a command is chosen for.
+    """The goal for the choice of a command.
 
     Attributes:
-        begin_s: when the step begins.
-        end_s: when it ends.
-        earliest_s: the first moment at which the command may take effect.
-        latest_s: the last one.
-        middle: the planned state in the step's middle.
+        begin_s: start of the step.
+        end_s: end of the step.
+        earliest_s: first time at which the command may take effect.
+        latest_s: last time at which it may take effect.
+        middle: the planned state in the middle of the step.
         end: the planned state at its end.
-        stands: whether the plan stands all through it.
-        is_at_limit: whether the plan needs all acceleration that there is, in this step or in the next.
+        stands: whether the plan stands during the whole step.
+        is_at_limit: whether the plan needs the maximum acceleration in this step or in the next one.
     """
 
     begin_s: float
@@ -63,11 +68,11 @@ class Step(NamedTuple):
 
     @property
     def duration_s(self) -> float:
-        """How long it lasts."""
+        """The duration of the step."""
         return self.end_s - self.begin_s
 
     def error_of_end(self, end: ReferenceState, ahead_deg_s: float) -> float:
-        """Return the squared error, in deg^2, of a reference at the end whose ramp is not over by so much."""
+        """Return the squared error, in deg^2, of a reference at the end whose ramp lacks the given speed."""
         speed_weight = _SPEED_WEIGHT_AT_LIMIT if self.is_at_limit else _SPEED_WEIGHT
         off_deg_s = abs(end.speed_deg_s - self.end.speed_deg_s) + _UNFINISHED_SHARE * ahead_deg_s
         return (end.angle_deg - self.end.angle_deg) ** 2 + (speed_weight * self.duration_s * off_deg_s) ** 2
@@ -78,23 +83,24 @@ class Step(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """A command and its moment; the target of one that goes on after the step is infinitely far."""
+    """A command and its time. The target of a command that continues after the step is infinitely far."""
 
     time_s: float
     command: MotionCommand
 
 
-def closest_command(before: Before, step: Step, grid: Grid, run_on_deg: float) -> Choice:
-    """Return the command that brings the reference nearest to the plan by the end of a step.
+def closest_command(before: Before, step: Step, grid: Grid, run_on_deg: float, enough_deg: float = 0.0) -> Choice:
+    """Return the command that brings the reference nearest to the plan at the end of a step.
 
     Args:
-        before: where the reference is at a time without the command.
-        step: what is wanted.
-        grid: the numbers that the wire can say.
-        run_on_deg: how far the table may run on when the line dies.
+        before: the reference at a time, without the command.
+        step: the goal.
+        grid: the resolution of the numbers in the protocol.
+        run_on_deg: maximum angle that the table may run on if the line fails.
+        enough_deg: the search ends at a command with at most this error; 0 searches all.
     """
     best, least = None, math.inf
-    before = cache(before)  # most candidates share their moments
+    before = cache(before)  # most candidates have the same times
     candidates = [] if step.stands else [_ramps(before, step, grid, run_on_deg)]
     if abs(step.end.speed_deg_s) <= STANDING_DEG_S:
         candidates.append(_stops(before(step.earliest_s), step, grid))
@@ -102,6 +108,8 @@ def closest_command(before: Before, step: Step, grid: Grid, run_on_deg: float) -
         error = _error_of(choice, before, step, least)
         if error < least:
             best, least = choice, error
+            if least <= enough_deg**2:
+                break
     assert best is not None
     return best
 
@@ -111,10 +119,10 @@ def with_target(choice: Choice, begin: ReferenceState, next_s: float, late_s: fl
 
     Args:
         choice: the command.
-        begin: where the reference is at its moment.
-        next_s: when the next command is due.
-        late_s: how late it may come.
-        grid: the numbers that the wire can say.
+        begin: the reference at the time of the command.
+        next_s: due time of the next command.
+        late_s: maximum delay of the next command.
+        grid: the resolution of the numbers in the protocol.
     """
     target_deg, speed, rate = choice.command
     if math.isfinite(target_deg):
@@ -128,12 +136,12 @@ def with_target(choice: Choice, begin: ReferenceState, next_s: float, late_s: fl
 
 
 def going_on(speed_deg_s: float, rate_deg_s2: float) -> MotionCommand:
-    """Return the command of a signed speed, without end."""
+    """Return the command for a signed speed, with a target at infinity."""
     return MotionCommand(math.copysign(math.inf, speed_deg_s), abs(speed_deg_s), rate_deg_s2)
 
 
 def _error_of(choice: Choice, before: Before, step: Step, least: float) -> float:
-    """Return the error of a choice, or a part of it that is not below `least` already."""
+    """Return the error of a choice, or a part of it that already exceeds `least`."""
     turning = before(choice.time_s)
 
     def state_at(time_s: float) -> ReferenceState:
@@ -149,15 +157,16 @@ def _error_of(choice: Choice, before: Before, step: Step, least: float) -> float
 
 
 def _ramps(before: Before, step: Step, grid: Grid, run_on_deg: float) -> Iterator[Choice]:
-    """Yield commands around those that would meet the end of a step if any number could be said.
+    """Yield commands near those that would reach the end of a step exactly, without the limited resolution.
 
-    For each S the middle of the ramp follows from the way. Its moment then follows from A: the ramp may last as long as
-    the step, or be so short that the run-on is.
+    For each S, the travel determines the middle of the ramp. Then A determines the time of the command: the ramp may
+    last as long as the step, or be as short as the run-on requires.
     """
     begin, unchanged = before(step.begin_s), before(step.end_s)
     missing_deg = step.end.angle_deg - unchanged.angle_deg
     unfinished = 2.0 * abs(missing_deg) / step.duration_s**2
-    for top in _speeds(unchanged.speed_deg_s, missing_deg, step, grid):
+    speeds = _speeds(unchanged.speed_deg_s, missing_deg, step, grid)
+    for top in sorted(speeds, key=lambda speed: abs(speed - step.end.speed_deg_s)):
         change = top - unchanged.speed_deg_s
         middle_s = step.end_s - (missing_deg / change if change else 0.5 * step.duration_s)
         fastest = max(abs(top), abs(begin.speed_deg_s), abs(unchanged.speed_deg_s))
@@ -173,9 +182,9 @@ def _ramps(before: Before, step: Step, grid: Grid, run_on_deg: float) -> Iterato
 
 
 def _speeds(unchanged_deg_s: float, missing_deg: float, step: Step, grid: Grid) -> set[float]:
-    """Return the signed S to try: around the plan's, and those that make up for a way that is missing.
+    """Return the signed S to try: near the plan's, and those that compensate a position error.
 
-    With the ramp at once, as late as it may come, or in the middle of the step.
+    The ramp may be at once, as late as possible, or in the middle of the step.
     """
     speeds = {*grid.speeds_around(step.end.speed_deg_s, _SPEEDS)}
     for left_s in (step.end_s - step.earliest_s, step.end_s - step.latest_s, 0.5 * step.duration_s):
@@ -185,7 +194,7 @@ def _speeds(unchanged_deg_s: float, missing_deg: float, step: Step, grid: Grid) 
 
 
 def _rates(change_deg_s: float, middle_s: float, step: Step) -> Iterator[float]:
-    """Yield the A of ramps with a given middle that begin or end with the step, or at the first or the last moment."""
+    """Yield values of A for ramps with a given middle that start or end with the step, or at the first or last time."""
     for half_s in (
         0.5 * step.duration_s,
         middle_s - step.earliest_s,
@@ -199,7 +208,8 @@ def _rates(change_deg_s: float, middle_s: float, step: Step) -> Iterator[float]:
 def _stops(start: ReferenceState, step: Step, grid: Grid) -> Iterator[Choice]:
     """Yield commands that bring the reference to rest, near the end of a step that ends at rest.
 
-    Where the plan stands the table does, on the nearest number: it does not swing between two that lie around the plan.
+    If the plan stands, the table stands at the nearest number. It does not alternate between two numbers around the
+    plan.
     """
     shifts = (0,) if step.stands else (-1, 0, 1)
     left_s = step.end_s - step.earliest_s

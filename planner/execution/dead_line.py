@@ -1,7 +1,7 @@
-"""What happens when the line dies in mid-run: nobody can stop the table, and it runs on to its last P.
+"""The consequences of a line that fails during a run: nobody can stop the table, and it continues to its last P.
 
-The arm stops where it is. Between two scan locations it may stand at either, so the way of the table has to be free at
-both. This is judged at many moments of a run, from the commands that were sent.
+The arm stops where it is. Between two scan locations it may be at either one, so the table's path must be clear at
+both. The sent commands determine this at many times of a run.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,17 +16,17 @@ from planner.map.config_map import ConfigurationMap
 from protocol.trapezoid import ReferenceState, advance, way_to_rest_deg
 
 MOMENT_S = 0.02
-"""From one moment to the next."""
+"""Time from one check to the next."""
 
 
 class DeadLine(NamedTuple):
-    """What would have happened if the line had died.
+    """The consequences if the line had failed.
 
     Attributes:
-        longest_deg: how far the table would have run on at most.
-        moments: at how many moments this was asked.
-        forbidden_moments: at how many of them it would have met a forbidden region.
-        first_s: the first of these, in the time of the motion; None where there is none.
+        longest_deg: maximum angle that the table would have run on.
+        moments: number of checks.
+        forbidden_moments: number of checks with a forbidden region on the path.
+        first_s: the first of these, in the time of the motion; None if there are none.
         first_location: the scan location that the arm had reached then.
     """
 
@@ -47,12 +47,12 @@ class DeadLine(NamedTuple):
 
 
 def judge_dead_line(configuration_map: ConfigurationMap, motion: TableMotion, record: Record) -> DeadLine:
-    """Return what would have happened if the line had died at any moment of a run.
+    """Return the consequences of a line that fails at any time of a run.
 
     Args:
-        configuration_map: where the table may be with the arm at a location.
-        motion: what the table should do.
-        record: what was sent to the table and seen of it.
+        configuration_map: the angles at which the table may be with the arm at a location.
+        motion: the planned motion of the table.
+        record: the sent commands and the readings.
     """
     longest_deg, moments = 0.0, 0
     forbidden: list[tuple[float, int]] = []
@@ -67,7 +67,7 @@ def judge_dead_line(configuration_map: ConfigurationMap, motion: TableMotion, re
 
 
 def _end_s(motion: TableMotion, record: Record) -> float:
-    """Return when a run ended: with its motion, or when the table was stopped."""
+    """Return the end of a run: the end of its motion, or the time at which the table was stopped."""
     if record.failure is None:
         return motion.end_s
     last_sent_s = record.sent[-1].time_s if record.sent else motion.start_s
@@ -76,7 +76,7 @@ def _end_s(motion: TableMotion, record: Record) -> float:
 
 
 def _arm_at(leg: Leg) -> tuple[int, ...]:
-    """Return the scan locations at which the arm may stand in a leg; none while the probe is drawn back."""
+    """Return the scan locations at which the arm may be in a leg; none while the probe is retracted."""
     if leg.phase is Phase.SCAN:
         return leg.column, leg.column + 1
     if leg.phase is Phase.ROTATE:
@@ -87,10 +87,10 @@ def _arm_at(leg: Leg) -> tuple[int, ...]:
 def _ways_to_rest(
     motion: TableMotion, sent: Sequence[Sent], until_s: float
 ) -> Iterator[tuple[float, float, float, float]]:
-    """Yield moments, and for each the lowest angle, the present one and the highest, until the table stands."""
+    """Yield times, and for each one the minimum, present and maximum angle until the table stands."""
     ends_s = [*(_effect_s(after) for after in sent[1:]), until_s]
     state = ReferenceState(motion.start_deg, 0.0)
-    for each, end_s in zip(sent, ends_s, strict=False):  # nothing was sent: no moments
+    for each, end_s in zip(sent, ends_s, strict=False):  # nothing was sent: no checks
         begin_s = _effect_s(each)
         for k in range(int(np.ceil(begin_s / MOMENT_S)), int(np.ceil(end_s / MOMENT_S))):
             there = advance(state, each.command, k * MOMENT_S - begin_s)

@@ -1,8 +1,8 @@
-"""Run a motion on the table at a port: send each command in time, and stop the table when something goes wrong.
+"""Execute a motion on the table at a port: send each command in time, and stop the table on any failure.
 
-One code path for a pty, TCP, a serial device and simulated time: the clock comes from the port. What is sent is
-`stream_correction`'s, what is seen between two commands `table_watch`'s. The record of both is complete whatever
-happens.
+The same code serves a pty, TCP, a serial device and simulated time: the clock is that of the port. `stream_correction`
+provides the commands, and `table_watch` the readings between two commands. The record of both is complete in every
+case.
 """
 
 from contextlib import suppress
@@ -23,34 +23,33 @@ from protocol.interrupts import signals_wait
 from protocol.progress import Progress
 from protocol.trapezoid import MotionCommand, ReferenceState, time_to_rest_s
 
-# Between the last reading and the next command: what the operating system may take.
+# Margin between the last reading and the next command for delays of the operating system.
 _SLACK_S = 0.005
-# From the call to the first command, beside what its lines take.
+# Time from the call to the first command, in addition to the transmission of its lines.
 _PREPARATION_S = 0.1
-# A table that rests shows so within this time, however late it answers.
+# A resting table is detected within this time, even with slow replies.
 _RESTING_S = 3.0
-# As long as any command: what its lines take at most.
+# Like any command: the maximum transmission time of its lines.
 _ANY_COMMAND = MotionCommand(-100.0, 10.0, 10.0)
 
 
 class ExecutionError(TableError):
-    """The table cannot do what the plan asks."""
+    """The table cannot execute the plan."""
 
 
 class Settings(NamedTuple):
-    """How a motion is run.
+    """Settings for the execution of a motion.
 
     Attributes:
-        lag_s: how long after the reference the encoder is at the same angle; the default is that of the emulator's
-            speed loop.
-        lead_s: how long before their time the commands take effect. With the lag, the encoder is in time; with 0, the
-            reference is.
-        tolerance_deg: how far the encoder may be from the plan before the table is stopped.
-        drift_deg: how far the reference may be from where it was expected before the rest is streamed anew.
-        drift_filter_s: over how long readings are averaged for that.
-        poll_s: from one reading of the position to the next, at least.
-        look_s: the same for looks from inside.
-        run_on_deg: how far the table may run on when the line dies.
+        lag_s: delay of the encoder behind the reference. The default is the delay of the emulator's speed loop.
+        lead_s: how early the commands take effect. With the value of the lag, the encoder is in time; with 0, the
+            reference is in time.
+        tolerance_deg: maximum deviation of the encoder from the plan; beyond it the table is stopped.
+        drift_deg: maximum deviation of the reference from its prediction; beyond it the rest is streamed again.
+        drift_filter_s: averaging time of the readings for this.
+        poll_s: minimum time from one reading of the position to the next.
+        look_s: the same for readings of the ground truth.
+        run_on_deg: maximum angle that the table may run on if the line fails.
     """
 
     lag_s: float = LAG_S
@@ -64,7 +63,7 @@ class Settings(NamedTuple):
 
     @property
     def encoder_delay_s(self) -> float:
-        """How long after its time in the plan the encoder is at an angle."""
+        """Delay from the time of an angle in the plan until the encoder has that angle."""
         return self.lag_s - self.lead_s
 
 
@@ -82,13 +81,13 @@ class Commands(Protocol):
         """Return when the next command has to be asked for, without lead; None when all are sent."""
 
     def latest_s(self, timed: TimedCommand) -> float:
-        """Return how late a command may be sent."""
+        """Return the maximum delay of a command."""
 
     def sent(self, timed: TimedCommand, late_s: float) -> None:
-        """Take note that the next command was sent, and how late."""
+        """Record that the next command was sent, and its delay."""
 
     def encoder_read(self, time_s: float, angle_deg: float) -> None:
-        """Take note of where the encoder was at a time that is known for certain."""
+        """Record the position of the encoder at a time that is known exactly."""
 
 
 def execute(
@@ -100,21 +99,21 @@ def execute(
     view: GroundTruth | None = None,
     progress: Progress | None = None,
 ) -> Record:
-    """Run a motion on a table that stands at its start, and return what happened.
+    """Execute a motion on a table that stands at its start, and return the record.
 
-    Whatever goes wrong, and Ctrl-C, stops the table and is named in the record.
+    Any failure, and Ctrl-C, stops the table and is named in the record.
 
     Args:
         table: the client at the table's port.
-        motion: what the table should do.
-        limits: greatest S and A.
-        wire: what its commands have to pass.
-        settings: how it is run.
-        view: a way to look into the table, where there is one; then it also gets its triggers from here.
+        motion: the planned motion of the table.
+        limits: maximum S and A.
+        wire: the properties of the serial line.
+        settings: settings for the execution.
+        view: access to the ground truth of the table, if there is one; then the triggers are sent through it too.
         progress: called with the time of the motion and its end, in ms.
 
     Raises:
-        StreamError: the commands follow one another faster than the wire carries them; nothing was sent.
+        StreamError: the serial line is too slow for the commands; nothing was sent.
     """
     settings = settings or Settings()
     commands = CorrectedStream(
@@ -143,15 +142,15 @@ def execute_commands(
 
     Args:
         table: the client at the table's port.
-        motion: what the table should do.
-        commands: what to send.
-        wire: what the commands have to pass.
-        settings: how it is run.
-        view: a way to look into the table, where there is one.
+        motion: the planned motion of the table.
+        commands: the commands to send.
+        wire: properties of the serial line.
+        settings: settings for the execution.
+        view: access to the ground truth of the table, if there is one.
         progress: called with the time of the motion and its end, in ms.
-        record: where to write what happens, if the caller wants to see it meanwhile.
+        record: the record to fill, for a caller that reads it during the motion.
     """
-    # The first command's S and A are to be sent in peace.
+    # The S and A of the first command are sent without time pressure.
     preparation_s = 4.0 * exchanges_s(wire, _ANY_COMMAND)
     origin_s = table.clock.now_s() - motion.start_s + settings.lead_s + preparation_s + _PREPARATION_S
     record = record or Record()
@@ -175,7 +174,7 @@ def execute_commands(
 
 
 def _stopped(table: TableClient) -> str:
-    """Stop the table, and return in words how that went; a signal that comes meanwhile shows in the exit status."""
+    """Stop the table, and return the result as text. A signal received meanwhile affects the exit status."""
     report = ""
     with suppress(KeyboardInterrupt), signals_wait():
         report = table.stop_and_report()
@@ -183,16 +182,16 @@ def _stopped(table: TableClient) -> str:
 
 
 def resting_deg(table: TableClient, wire: Wire) -> float:
-    """Return where the table rests, before anything is sent that moves it.
+    """Return the rest position of the table, before any command that moves it.
 
     Raises:
-        ExecutionError: it turns, so nobody knows by which way it would come to the start.
+        ExecutionError: the table turns, so its path to the start is unknown.
     """
     try:
         return table.wait_until_at(table.position_deg(), wire.quantum, _RESTING_S)
     except ArrivalTimeout as error:
         raise ExecutionError(
-            f"the table is at {error.position_deg:g} deg and turns already; wait until it stands, then try again"
+            f"the table is at {error.position_deg:g} deg and is already turning; wait until it stands, then try again"
         ) from error
 
 
@@ -200,7 +199,7 @@ def bring_to(table: TableClient, angle_deg: float, limits: Limits, wire: Wire, t
     """Move the table to an angle at the limits, and wait until it stands there.
 
     Raises:
-        TableError: the table did not get there; it was stopped, as after Ctrl-C.
+        TableError: the table did not arrive; it was stopped, as after Ctrl-C.
     """
     way = Grid(limits, wire).command(MotionCommand(angle_deg, *limits))
     needed_s = time_to_rest_s(ReferenceState(table.position_deg(), 0.0), way)
@@ -209,8 +208,8 @@ def bring_to(table: TableClient, angle_deg: float, limits: Limits, wire: Wire, t
         table.set_acceleration(way.acceleration_deg_s2)
     except CommandRefused as error:
         raise ExecutionError(
-            f"this table refuses the plan's limits, {limits.speed_deg_s:g} deg/s and"
-            f" {limits.acceleration_deg_s2:g} deg/s2; plan within this table's own limits"
+            f"the table refuses the limits of the plan, {limits.speed_deg_s:g} deg/s and"
+            f" {limits.acceleration_deg_s2:g} deg/s2; create a plan within the limits of the table"
         ) from error
     try:
         table.move_to(way.target_deg)
@@ -223,7 +222,7 @@ def bring_to(table: TableClient, angle_deg: float, limits: Limits, wire: Wire, t
 
 
 class _Run:
-    """The commands of one motion under way, each sent so that it takes effect in time."""
+    """The commands of one running motion. Each is sent so that it takes effect in time."""
 
     def __init__(
         self,
@@ -239,7 +238,7 @@ class _Run:
         self._latched: MotionCommand | None = None
 
     def go(self, motion: MotionInTime) -> None:
-        """Send all commands in their time, then wait until the table stands."""
+        """Send all commands at their times, then wait until the table stands."""
         while (timed := self._commands.next()) is not None:
             self._send(timed)
             begin_s = self._commands.begin_s(self._wire, self._latched)
@@ -248,7 +247,7 @@ class _Run:
         self._watch.wait_for_rest(self._latched.target_deg if self._latched else motion.start_deg)
 
     def _send(self, timed: TimedCommand) -> None:
-        """Send A and S where they change, and P so that its CR arrives in time."""
+        """Send A and S if they change, and P so that its CR arrives in time."""
         command, before = timed.command, self._latched
         if before is None or command.acceleration_deg_s2 != before.acceleration_deg_s2:
             self._table.set_acceleration(command.acceleration_deg_s2)
@@ -270,5 +269,5 @@ class _Run:
         if late_s > allowed_s:
             raise ExecutionError(
                 f"the command of location {timed.leg.column} would have come {late_s:.2f} s late, more than"
-                f" {allowed_s:g} s: the table or this machine answers too slowly"
+                f" {allowed_s:g} s: the table or this machine is too slow"
             )

@@ -1,7 +1,7 @@
-"""The parts of a motion that get one command each: its legs, and of those that are too long for one command, parts.
+"""The pieces of a motion with one command each: its legs, and parts of legs that are too long for one command.
 
-A step that lasts long, fast and with little acceleration would let the table run on far when the line dies
-(`run_on`), or leave the plan between two locations by more than is wanted.
+A long, fast step with low acceleration has two problems. The table would run on far if the line fails (`run_on`). It
+would also deviate too much from the plan between two locations.
 """
 
 import math
@@ -13,31 +13,32 @@ from planner.table.motion import Limits
 from planner.table.wire import Wire, exchanges_s
 from protocol.trapezoid import MotionCommand
 
-# What the reference may deviate between two commands because A is greater than that of the plan.
+# Maximum deviation of the reference between two commands because A is larger than in the plan.
 _DEVIATION_DEG = 0.1
-# No shorter parts: the line and the readings of the encoder need their time.
+# No shorter pieces: the line and the readings of the encoder need their time.
 _SHORTEST_S = 0.1
 _SHORTEST_EXCHANGES = 2.5
-# No longer ones: S and A are coarse, and what they cannot say grows with the time that they hold.
+# No longer pieces: S and A have a limited resolution, and the resulting error grows with time.
 _LONGEST_S = 1.5
-# The reference may be some tenths ahead of its leg: start and targets are rounded to what the wire can say.
+# The reference may be some tenths ahead of its leg, because start and targets are rounded to the resolution of the
+# protocol.
 _ROUNDED_DEG = 0.25
 
 
 def spacing_s(farthest_deg: float, limits: Limits, wire: Wire) -> float:
-    """Return how long the longest commands up to an angle take on the line with all that is read between them."""
+    """Return the transmission time of the longest commands of a motion, including all readings between them."""
     farthest_deg = abs(farthest_deg) + 1000.0
     return 1.25 * exchanges_s(wire, MotionCommand(-farthest_deg, *limits)) + 0.01
 
 
 def pieces_of(motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float) -> tuple[Leg, ...]:
-    """Return the legs of a motion, in parts where one command for the whole leg would not do."""
+    """Return the legs of a motion, divided if one command for the whole leg is not sufficient."""
     spacing = spacing_s(farthest_deg(motion), limits, wire)
     return tuple(piece for leg in motion.legs for piece in pieces_of_leg(leg, limits, spacing, run_on_deg))
 
 
 def farthest_deg(motion: TableMotion) -> float:
-    """Return the greatest angle from 0 at which a leg of a motion begins."""
+    """Return the maximum distance from angle 0 of the start of a leg of a motion."""
     return max(abs(leg.start.angle_deg) for leg in motion.legs)
 
 
@@ -58,9 +59,10 @@ def pieces_of_leg(leg: Leg, limits: Limits, spacing: float, run_on_deg: float) -
 
 
 def _follows(leg: Leg, count: int, limits: Limits, run_on_deg: float) -> bool:
-    """Tell whether parts of a leg can be followed with a short run-on, and closely.
+    """Return whether pieces of a leg can be followed accurately and with a short run-on.
 
-    A ramp at A in the middle of a part of acceleration a and duration T leaves the plan by a T^2 / 8 (1 - a / A).
+    Let a piece have the acceleration a and the duration T, and the ramp A in its middle. Then the deviation from the
+    plan is a T^2 / 8 (1 - a / A).
     """
     part_s = leg.duration_s / count
     speed_deg_s = max(abs(leg.start.speed_deg_s), abs(leg.state_at(leg.end_s).speed_deg_s))
@@ -71,7 +73,7 @@ def _follows(leg: Leg, count: int, limits: Limits, run_on_deg: float) -> bool:
 
 
 def _is_short(leg: Leg, count: int, limits: Limits, run_on_deg: float) -> bool:
-    """Tell whether a motion to rest, with nearer targets on its way, can be cut anywhere with a short run-on."""
+    """Return whether a motion to rest can be divided anywhere with a short run-on, by nearer targets."""
     assert leg.command is not None
     if abs(leg.command.target_deg - leg.start.angle_deg) <= run_on_deg:
         return True
@@ -80,7 +82,7 @@ def _is_short(leg: Leg, count: int, limits: Limits, run_on_deg: float) -> bool:
 
 
 def _nearer(leg: Leg, part: Leg) -> MotionCommand:
-    """Return the command of a leg with the nearest target for which the table does not brake within a part of it."""
+    """Return the command of a leg with the nearest target for which the table does not brake within a piece of it."""
     command = leg.command
     assert command is not None
     forward = math.copysign(1.0, command.target_deg - leg.start.angle_deg)

@@ -1,4 +1,4 @@
-"""The robot's side of a run: the arm's joints at the times of the table's motion."""
+"""The motion of the robot in a run: the arm's joints at the times of the table's motion."""
 
 from typing import NamedTuple
 
@@ -6,18 +6,18 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.execution.table_motion import Phase, TableMotion
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 
 
 class RobotMotion(NamedTuple):
-    """The joint path in time; between two samples the joints move in proportion.
+    """The joint path over time; between two samples it is linear.
 
     Attributes:
         times_s: (m,) ascending, in the time of the table's motion.
         joints_deg: (m, 6).
-        columns: (m,) the scan location that each sample belongs to.
-        phases: (m,) what goes on from there: in a pause the robot draws the probe back along its beam and turns to the
-            joints of the next location; how is its own program's business.
+        columns: (m,) the scan location of each sample.
+        phases: (m,) what follows the sample. In a pause, the robot's own program retracts the probe along its beam and
+            turns to the joints of the next location.
     """
 
     times_s: FloatArray
@@ -26,15 +26,15 @@ class RobotMotion(NamedTuple):
     phases: tuple[Phase, ...]
 
     def joints_at(self, time_s: float) -> FloatArray:
-        """Return the (6,) joints at a time: what an ideal robot latches at a trigger."""
+        """Return the (6,) joints at a time, as an ideal robot latches them at a trigger."""
         return np.array([np.interp(time_s, self.times_s, self.joints_deg[:, j]) for j in range(6)])
 
 
 def turning_time_s(plan: Plan, joints_deg: FloatArray, max_speeds_deg_s: FloatArray) -> float:
-    """Return the time that the arm needs to turn in any pause of a plan, from its joints before it to those after it.
+    """Return the maximum time that the arm needs to turn in any pause of a plan.
 
     Args:
-        plan: the table's motion.
+        plan: the motion of the table.
         joints_deg: (n + 1, 6) the arm's joints at each scan location.
         max_speeds_deg_s: (6,) maximum joint speeds.
     """
@@ -46,7 +46,7 @@ def robot_motion(motion: TableMotion, joints_deg: FloatArray) -> RobotMotion:
     """Return the joint path of a run.
 
     Args:
-        motion: the table's motion.
+        motion: the motion of the table.
         joints_deg: (n + 1, 6) the arm's joints at each scan location.
     """
     samples = [(0.0, 0, Phase.SCAN)]

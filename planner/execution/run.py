@@ -1,4 +1,4 @@
-"""A plan file carried out and verified, from the check before the first byte to the files that tell of it."""
+"""The execution of a plan file, from the check before the first byte to the verification and the output files."""
 
 import time
 from pathlib import Path
@@ -25,7 +25,7 @@ from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_motion import PauseTimes, TableMotion
 from planner.execution.table_port import CONTROL_TIMEOUT_S, open_port
 from planner.map.map_file import MAP_FILE
-from planner.planning.plan_file import PLAN_FILE
+from planner.plans.plan_file import PLAN_FILE
 from planner.set_aside import set_aside
 from planner.table.wire import Wire
 from protocol import TableClient
@@ -35,7 +35,7 @@ from protocol.progress import Progress
 
 
 class RunOptions(NamedTuple):
-    """How a plan is run; see the options of `python -m planner run`."""
+    """Settings for the execution of a plan; see the options of `python -m planner run`."""
 
     port: str
     baud: int = 9600
@@ -63,7 +63,7 @@ class Duration(NamedTuple):
 
 
 class Finished(NamedTuple):
-    """What a run came to, and how long it took."""
+    """The results of a run, and its duration."""
 
     checked: RunVerification
     duration: Duration
@@ -76,11 +76,11 @@ def run_plan(
     map_file: Path | None = None,
     progress: Progress | None = None,
 ) -> Finished:
-    """Carry a plan out on the table at a port, write what happened to `out`, and return what it came to.
+    """Execute a plan on the table at a port, write the results to `out`, and return them.
 
     Raises:
-        PlannerError: the plan must not, or cannot, be run; nothing has moved.
-        TableError: the table could not be reached, or not be brought to the start.
+        PlannerError: the plan must not or cannot be executed; the table has not moved.
+        TableError: the table did not reply, or did not reach the start.
         OSError: the folder cannot be written.
     """
     map_file = map_file or plan_file.with_name(MAP_FILE)
@@ -116,7 +116,7 @@ def run_plan(
 
 
 def _written(out: Path, plan_file: Path, map_file: Path, stored: StoredRun) -> RunVerification:
-    """Verify a run, write all that is known of it, and return what it came to."""
+    """Verify a run, write all its data, and return the results."""
     run_input, conditions, motion, record = stored
     checked = verify_run(run_input, motion, record, conditions.lead_s, conditions.tolerance_deg)
     copy_input(out, plan_file, map_file)
@@ -127,14 +127,14 @@ def _written(out: Path, plan_file: Path, map_file: Path, stored: StoredRun) -> R
 
 
 def _with_time_for_the_arm(pause_times: PauseTimes, run_input: RunInput) -> PauseTimes:
-    """Return the times of a pause in which every joint can turn at most at its maximum speed."""
+    """Return the times of a pause in which every joint can make its maximum turn at its maximum speed."""
     max_speeds_deg_s = np.array(run_input.arm.max_speed_deg_s)
     needed_s = turning_time_s(run_input.plan, run_input.joints_deg, max_speeds_deg_s)
     return pause_times._replace(rotate_s=max(pause_times.rotate_s, needed_s))
 
 
 def _turns(run_input: RunInput, motion: TableMotion, position_deg: float, arm_is_away: bool) -> int:
-    """Return the full turns to add to the plan, so that its start can be reached from where the table stands."""
+    """Return the number of full turns to add to the plan so that its start can be reached."""
     if arm_is_away:
         return nearest_turns(position_deg, motion.start_deg)
     return turns_to_start(run_input.problem.map, position_deg, motion.start_deg)

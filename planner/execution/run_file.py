@@ -1,7 +1,7 @@
-"""A run on disk: `run.json` (what was commanded, and what it came to) and `run.csv` (where the table was seen).
+"""The files of a run: `run.json` (commands and results) and `run.csv` (readings of the table).
 
-Beside them lie copies of plan and map, so that the folder says all, and the robot's side as `robot.csv` and
-`robot.json`. Each file appears when it is whole.
+Copies of plan and map are stored with them, so that the folder is complete, and the motion of the robot as `robot.csv`
+and `robot.json`. Each file appears when it is complete.
 """
 
 import csv
@@ -21,7 +21,7 @@ from planner.execution.run_record import Correction, Observation, Record, Sent
 from planner.execution.run_verification import RunVerification
 from planner.execution.table_motion import PauseTimes, Phase, TableMotion
 from planner.map.map_file import MAP_FILE
-from planner.planning.plan_file import PLAN_FILE
+from planner.plans.plan_file import PLAN_FILE
 from planner.table.wire import Wire
 from protocol.data_file import DataFileError, read_json
 from protocol.trapezoid import MotionCommand
@@ -31,24 +31,25 @@ _FORMAT = "seventh-axis run"
 _FORMAT_VERSION = 1
 RUN_FILE, SEEN_FILE = "run.json", "run.csv"
 RUN_RESULTS = (RUN_FILE, SEEN_FILE, "run.png", "robot.csv", "robot.json", "report.html")
-"""What a run, and the page of it, leave in a folder beside the copies of plan and map."""
+"""The files that a run and its page write to a folder, besides the copies of plan and map."""
 
 
 class RunFileError(PlannerError):
-    """A folder that holds no run, or a damaged one."""
+    """A folder that contains no run, or a damaged one."""
 
 
 class RunConditions(NamedTuple):
-    """Under what a run took place.
+    """The conditions of a run.
 
     Attributes:
-        port: the port's URL.
-        wire: what the commands had to pass.
-        lead_s: how much ahead of their time they took effect.
+        port: URL of the port.
+        wire: properties of the serial line.
+        lead_s: how early the commands took effect.
         tolerance_deg: allowed encoder deviation at a location.
         turns: full turns of the table added to the plan.
-        pause_times: how long the robot takes in a pause.
-        run_on_deg: how far the table was to run on at most if the line died; None in a run of an earlier version.
+        pause_times: duration of the robot's actions in a pause.
+        run_on_deg: maximum angle that the table was allowed to run on if the line failed; None in a run of an earlier
+            version.
     """
 
     port: str
@@ -61,7 +62,7 @@ class RunConditions(NamedTuple):
 
 
 class StoredRun(NamedTuple):
-    """A run as it was read back."""
+    """A run that was read from its files."""
 
     run_input: RunInput
     conditions: RunConditions
@@ -77,7 +78,7 @@ def save_run(
     record: Record,
     verification: RunVerification,
 ) -> None:
-    """Write `run.json` and `run.csv`; angles as they were on the wire, in degrees."""
+    """Write `run.json` and `run.csv`; angles are as in the protocol, in degrees."""
     document = {
         "format": _FORMAT,
         "format_version": _FORMAT_VERSION,
@@ -130,7 +131,7 @@ def save_robot(folder: Path, robot: RobotMotion, record: Record) -> None:
 
 
 def copy_input(folder: Path, plan_file: Path, map_file: Path) -> None:
-    """Copy plan and map beside the run, unless they lie there."""
+    """Copy plan and map to the folder of the run, unless they are already there."""
     for source, name in ((plan_file, PLAN_FILE), (map_file, MAP_FILE)):
         target = folder / name
         if not (target.exists() and target.samefile(source)):
@@ -142,7 +143,7 @@ def load_run(folder: Path) -> StoredRun:
     """Return the run in a folder.
 
     Raises:
-        PlannerError: there is none, or it is damaged.
+        PlannerError: the folder contains no run, or it is damaged.
     """
     try:
         document = read_json(folder / RUN_FILE)
@@ -158,7 +159,7 @@ def load_run(folder: Path) -> StoredRun:
         )
     except OSError as error:
         raise RunFileError(
-            f"{folder}: holds no run ({error.strerror or error}); python -m planner run writes one"
+            f"{folder}: contains no run ({error.strerror or error}); python -m planner run writes one"
         ) from error
     except DataFileError as error:
         raise RunFileError(f"{error}; python -m planner run writes a folder with {RUN_FILE}") from error

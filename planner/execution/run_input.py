@@ -1,4 +1,4 @@
-"""What `run` works on: a plan file, checked against the map that it was made on."""
+"""The input of `run`: a plan file, checked against its map."""
 
 import json
 from dataclasses import asdict, dataclass, replace
@@ -12,28 +12,28 @@ from planner.execution.table_motion import PauseTimes, TableMotion
 from planner.kinematics.arm import Arm
 from planner.kinematics.configuration import Configuration
 from planner.map.map_file import MAP_FILE, load_maps
-from planner.planning.arm_check import arm_fault
-from planner.planning.plan import Plan, path_cost
-from planner.planning.plan_check import contradiction
-from planner.planning.plan_file import StoredPlan, load_plan
-from planner.planning.problem import Problem
-from planner.planning.verification import verify
+from planner.plans.arm_check import arm_fault
+from planner.plans.plan import Plan, path_cost
+from planner.plans.plan_check import contradiction
+from planner.plans.plan_file import StoredPlan, load_plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
 
 
 class RunInputError(PlannerError):
-    """A plan that must not be run: damaged, edited, or not of this map."""
+    """A plan that must not be executed: it is damaged, edited, or from another map."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunInput:
-    """A plan and what it was made on.
+    """A plan and its basis.
 
     Attributes:
-        name: what the scan is called.
-        plan: the table's motion.
+        name: name of the scan.
+        plan: the motion of the table.
         problem: map, limits and weights.
-        joints_deg: (n + 1, 6) the arm's joints at each location.
-        arm: the arm that follows.
+        joints_deg: (n + 1, 6) joints of the arm at each location.
+        document: content of the plan file.
     """
 
     name: str
@@ -47,7 +47,7 @@ class RunInput:
         return TableMotion(self.plan, self.problem.limits, pause_times or PauseTimes())
 
     def with_cost(self) -> "RunInput":
-        """Return the same with the cost that the motion has, whatever the file says."""
+        """Return the same input with the computed cost of the motion, instead of the cost in the file."""
         plan = self.plan
         motion = plan.angles_deg, plan.speeds_deg_s, plan.accelerations_deg_s2
         return replace(self, plan=replace(plan, cost=path_cost(self.problem, *motion, plan.pauses)))
@@ -58,7 +58,7 @@ class RunInput:
 
 
 def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
-    """Return a plan with its map, which is `map.npz` beside the plan unless another is given.
+    """Return a plan with its map, which is `map.npz` beside the plan unless another file is given.
 
     Raises:
         PlannerError: a file cannot be read, is damaged or edited, or plan and map do not belong together.
@@ -67,13 +67,13 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
     map_file = map_file or plan_file.with_name(MAP_FILE)
     if not map_file.is_file():
         raise RunInputError(
-            f"{map_file}: the plan's map is not there; python -m planner map {stored.scan} --out {map_file.parent}"
-            " writes it"
+            f"{map_file}: the map of the plan was not found;"
+            f" to write it: python -m planner map {stored.scan} --out {map_file.parent}"
         )
     maps = load_maps(map_file)
     configuration = Configuration.parse(stored.plan.configuration)
     if configuration not in maps or maps[configuration].metadata.get("digest") != stored.map_digest:
-        raise RunInputError(f"{map_file}: is not the map that {plan_file} was made on; compute map and plan anew")
+        raise RunInputError(f"{map_file}: is not the map of {plan_file}; compute map and plan again")
     problem = Problem(maps[configuration], stored.plan.step_s, stored.limits, stored.weights)
     run_input = RunInput(stored.scan, stored.plan, problem, stored.arm.joints_deg, stored.arm.cell.arm)
     _check(plan_file, run_input)
@@ -82,33 +82,35 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
 
 
 def _check(plan_file: Path, run_input: RunInput) -> None:
-    """Refuse a plan that breaks its own equations, its limits, or a forbidden region."""
+    """Refuse a plan that violates its own equations, its limits, or a forbidden region."""
     plan, problem = run_input.plan, run_input.problem
     locations = problem.map.location_count
     if len(plan.angles_deg) != locations or run_input.joints_deg.shape != (locations, 6):
-        raise RunInputError(f"{plan_file}: is damaged: its map has {locations} locations, and the plan has not")
+        raise RunInputError(f"{plan_file}: is damaged: the plan does not have the {locations} locations of its map")
     numbers = plan.angles_deg, plan.speeds_deg_s, plan.accelerations_deg_s2
     if not all(np.isfinite(array).all() for array in numbers):
-        raise RunInputError(f"{plan_file}: is damaged: it holds values that are no numbers")
+        raise RunInputError(f"{plan_file}: is damaged: it contains values that are not numbers")
     fault = contradiction(plan)
     if fault is not None:
         raise RunInputError(f"{plan_file}: has been edited: {fault}")
     checked = verify(problem, plan)
     if not checked.within_limits:
-        raise RunInputError(f"{plan_file}: exceeds its own limits; plan anew")
+        raise RunInputError(f"{plan_file}: exceeds its own limits; create the plan again")
     if checked.forbidden_steps:
-        raise RunInputError(f"{plan_file}: meets a forbidden region in step {checked.forbidden_steps[0]}; plan anew")
+        raise RunInputError(
+            f"{plan_file}: meets a forbidden region in step {checked.forbidden_steps[0]}; create the plan again"
+        )
 
 
 def _check_arm(plan_file: Path, run_input: RunInput, stored: StoredPlan) -> None:
-    """Refuse a plan that the arm cannot follow, by the file or by our own check, or whose arm is not the map's."""
+    """Refuse a plan that the arm cannot follow, by the file or by this check, or with an arm other than the map's."""
     if run_input.problem.map.metadata.get("arm") != json.loads(json.dumps(asdict(stored.arm.cell.arm))):
-        raise RunInputError(f"{plan_file}: its arm is not the arm that its map was made for; compute map and plan anew")
+        raise RunInputError(f"{plan_file}: its arm is not the arm of its map; compute map and plan again")
     if len(stored.arm.T_WS) != run_input.problem.map.location_count:
-        raise RunInputError(f"{plan_file}: is damaged: it holds {len(stored.arm.T_WS)} poses of the probe")
+        raise RunInputError(f"{plan_file}: is damaged: it contains {len(stored.arm.T_WS)} poses of the probe")
     fault = arm_fault(stored.arm, stored.plan) or stored.arm_fault
     if fault is not None:
         raise RunInputError(
-            f"{plan_file}: the arm cannot follow the plan: {fault}; plan anew, with a path that turns the probe less or"
-            " takes more time"
+            f"{plan_file}: the arm cannot follow the plan: {fault}; create a plan for a path with less rotation of the"
+            " probe or more time"
         )

@@ -1,4 +1,4 @@
-"""Pictures of a run: the path on the map, the motion, and how far it was from the plan."""
+"""Plots of a run: the path on the map, the motion, and the deviation from the plan."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from planner.execution.run_verification import RunVerification
 from planner.execution.table_motion import Phase
 from planner.map.map_colors import colored
 from planner.map.map_plots import draw_map
-from planner.planning.plan_plots import draw_path, mark_pauses
+from planner.plans.plan_plots import draw_path, mark_pauses
 from planner.plot_style import (
     BLUE,
     EXECUTED,
@@ -41,7 +41,7 @@ def map_figure(run: StoredRun, checked: RunVerification) -> Figure:
 
 @styled()
 def motion_figure(run: StoredRun) -> Figure:
-    """Return angle and speed in time, planned and seen."""
+    """Return angle and speed over time, planned and measured."""
     figure = new_figure(4.4)
     angle, speed = figure.subplots(2, 1, sharex=True)
     draw_angle(angle, run)
@@ -52,7 +52,7 @@ def motion_figure(run: StoredRun) -> Figure:
 
 @styled()
 def deviation_figure(run: StoredRun, checked: RunVerification) -> Figure:
-    """Return how far each angle was from the plan."""
+    """Return the deviation of each angle from the plan."""
     figure = new_figure(3.2)
     draw_deviation(figure.subplots(), run, checked)
     return figure
@@ -60,7 +60,7 @@ def deviation_figure(run: StoredRun, checked: RunVerification) -> Figure:
 
 @styled()
 def plot_run(run: StoredRun, checked: RunVerification, file: Path) -> None:
-    """Write all pictures of a run into one file, which appears when it is whole."""
+    """Write all plots of a run to one file, which appears when it is complete."""
     figure = new_figure(11.6)
     on_map, angle, speed, deviation = figure.subplots(4, 1, height_ratios=(2.4, 1.2, 1.2, 1.4))
     draw_paths(on_map, run, checked)
@@ -91,7 +91,7 @@ def draw_paths(axes: Axes, run: StoredRun, checked: RunVerification) -> None:
 
 
 def draw_angle(axes: Axes, run: StoredRun) -> None:
-    """Draw the angle in time."""
+    """Draw the angle over time."""
     times = np.linspace(run.motion.start_s, run.motion.end_s, _SAMPLES)
     axes.plot(times, run.motion.angles_at(times), **PLANNED, label="planned")
     seen = [(each.time_s, each.encoder_deg) for each in run.record.observations if each.source == "H"]
@@ -119,7 +119,7 @@ def draw_speed(axes: Axes, run: StoredRun) -> None:
 
 
 def draw_deviation(axes: Axes, run: StoredRun, checked: RunVerification) -> None:
-    """Draw seen minus planned, between the tolerances."""
+    """Draw measured minus planned angles, with the tolerances."""
     seen = [each for each in run.record.observations if each.source == "inside" and each.time_s >= 0.0]
     times = np.array([each.time_s for each in seen])
     planned, ahead = run.motion.angles_at(times), run.motion.angles_at(times + run.conditions.lead_s)

@@ -1,4 +1,4 @@
-"""What was sent to the table and seen of it in a run."""
+"""The commands sent to the table and the readings from it in a run."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from protocol.trapezoid import MotionCommand
 
 
 class Sent(NamedTuple):
-    """A motion command as it was sent; times in s of the motion, `late_s` against its schedule."""
+    """A motion command that was sent. Times are in s of the motion; `late_s` is the delay against the schedule."""
 
     time_s: float
     late_s: float
@@ -18,16 +18,16 @@ class Sent(NamedTuple):
 
 
 class Observation(NamedTuple):
-    """Where the table was seen, in degrees.
+    """A reading of the table, in degrees.
 
     Attributes:
-        time_s: when, in the time of the motion.
-        source: "H", "L", or "inside" for a look that an emulator allowed; "H late" when the answer came so late that
-            the time is uncertain.
-        encoder_deg: the encoder, as `source` tells it.
-        column: the scan location whose trigger this belongs to.
-        reference_deg: the controller's reference, where it was told.
-        true_deg: the table's own angle, where it was told.
+        time_s: time of the reading, in the time of the motion.
+        source: "H", "L", or "inside" for a reading of an emulator's ground truth; "H late" if the reply was so late
+            that the time is uncertain.
+        encoder_deg: the encoder angle from `source`.
+        column: the scan location of the trigger of this reading.
+        reference_deg: the controller's reference, if known.
+        true_deg: the true angle of the table, if known.
     """
 
     time_s: float
@@ -39,9 +39,9 @@ class Observation(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """From `time_s` on the stream was computed anew: the reference was `slip_deg` ahead of where it was to be.
+    """From `time_s` on, the stream was computed again: the reference was ahead of its planned position by `slip_deg`.
 
-    By what the readings say (clocks that differ), or because a command came late.
+    The cause is a deviation of the readings (clocks that differ), or a late command.
     """
 
     time_s: float
@@ -50,15 +50,15 @@ class Correction(NamedTuple):
 
 @dataclass
 class Record:
-    """What was sent and seen; it grows while the motion runs.
+    """Commands and readings; the record grows during the motion.
 
     Attributes:
         sent: the motion commands.
-        observations: where the table was seen.
-        corrections: where the stream was changed for drift.
-        failure: why the motion was stopped; None when it came to its end.
-        has_strayed: whether it was stopped because the table was not where it should be.
-        origin_s: the client's clock at time 0 of the motion; it means nothing in a run that was read back.
+        observations: the readings of the table.
+        corrections: the points where the stream was changed because of drift.
+        failure: why the motion was stopped; None if it was completed.
+        has_strayed: whether it was stopped because of a position error of the table.
+        origin_s: the client's clock at time 0 of the motion; without meaning in a run that was read from a file.
     """
 
     sent: list[Sent] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""A run as one HTML page: verdict, figures, pictures as inline SVG, and all commands."""
+"""The HTML page of a run: verdict, figures, pictures as inline SVG, and all commands."""
 
 from collections.abc import Iterator
 
@@ -24,13 +24,13 @@ def run_report(run: StoredRun, checked: RunVerification, origin: Origin | None =
         verdict(checked.verdict, checked.is_verified),
         table(("", ""), list(_summary(run, checked)), words=True),
         heading("On the configuration map"),
-        paragraph("Gray is allowed, the whiter the better; colors are forbidden. Both paths wrap at 360 deg."),
+        paragraph("Gray is allowed (lighter is better); colors are forbidden. Both paths wrap at 360 deg."),
         figure(svg_of(map_figure(run, checked)), "Configuration map with the planned and the executed path."),
         heading("Motion"),
         figure(svg_of(motion_figure(run)), "Planned and executed angle and speed of the table over time."),
         heading("Deviation from the plan"),
         paragraph(
-            "The dashed lines are the tolerance at the scan locations."
+            "The dashed lines show the tolerance at the scan locations."
             f" L and H carry {counted(wire.decimals, 'decimal')}:"
             f" up to {0.5 * wire.quantum:g} deg of their deviation is rounding."
             " The true angle differs from the encoder's by the backlash of the gears."
@@ -54,7 +54,7 @@ def _summary(run: StoredRun, checked: RunVerification) -> Iterator[tuple[str, st
     yield "planned by", f"{plan.planner}, {plan.configuration}"
     yield "locations", f"{len(plan.angles_deg)}, one every {plan.step_s:g} s, {counted(len(plan.pauses), 'pause')}"
     yield "port", f"{conditions.port}, {conditions.wire.baud} baud, {counted(conditions.wire.decimals, 'decimal')}"
-    yield "encoder at the locations", f"{checked.worst_deg:.3f} deg off at most, {checked.tolerance_deg:g} allowed"
+    yield "encoder at the locations", f"{checked.worst_deg:.3f} deg at most, {checked.tolerance_deg:g} allowed"
     yield "forbidden cells touched in", counted(len(checked.forbidden_steps), "step")
     yield "margin left to a forbidden cell", f"{checked.margin_deg:.2f} deg"
     yield "latest command", f"{1000.0 * checked.latest_command_s:.1f} ms late"
@@ -63,7 +63,7 @@ def _summary(run: StoredRun, checked: RunVerification) -> Iterator[tuple[str, st
         yield "full turns added to the plan", f"{conditions.turns}, to start where the table stood"
     yield "commands sent ahead by", f"{1000.0 * conditions.lead_s:g} ms"
     if run.record.sent:
-        yield "if the line had died", f"{checked.dead_line}"
+        yield "if the line had failed", f"{checked.dead_line}"
 
 
 def _deviations(checked: RunVerification) -> Iterator[tuple[str, ...]]:
@@ -91,6 +91,6 @@ def _commands(run: StoredRun) -> str:
 def _corrections(run: StoredRun) -> str:
     corrections = run.record.corrections
     if not corrections:
-        return paragraph("Neither drift nor late commands had to be corrected.")
+        return paragraph("No drift and no late command had to be corrected.")
     times = ", ".join(f"{each.time_s:.1f} s ({each.slip_deg:+.2f} deg)" for each in corrections)
-    return paragraph(f"For drift or a late command the stream was computed anew at {times}.")
+    return paragraph(f"Because of drift or a late command, the stream was computed again at {times}.")

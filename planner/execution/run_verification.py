@@ -1,4 +1,4 @@
-"""Was the executed motion the planned one, and did it stay out of the forbidden regions?"""
+"""Verify that the executed motion matches the plan and does not touch forbidden regions."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -12,16 +12,16 @@ from planner.execution.run_input import RunInput
 from planner.execution.run_record import Observation, Record
 from planner.execution.table_motion import Phase, TableMotion
 from planner.map.config_map import ConfigurationMap
-from planner.planning.crossing import crossing_is_allowed
-from planner.planning.plan import path_cost
+from planner.plans.crossing import crossing_is_allowed
+from planner.plans.plan import path_cost
 from planner.table.cost import PathCost
 
-# A latch this far from the plan is that of an earlier trigger.
+# A latch with a larger deviation from the plan belongs to an earlier trigger.
 _STALE_DEG = 1.0
 
 
 class Deviation(NamedTuple):
-    """How far something was from the plan, in degrees: at the scan locations, at any time seen, and on average."""
+    """Deviations from the plan, in degrees: at the scan locations, at any time, and on average."""
 
     at_locations_deg: float
     anywhere_deg: float
@@ -29,24 +29,24 @@ class Deviation(NamedTuple):
 
 
 class RunVerification(NamedTuple):
-    """What a run came to.
+    """The results of a run.
 
     Attributes:
-        failure: why the motion was stopped; None when it came to its end.
-        has_strayed: whether it was stopped because the table was not where it should be.
-        deviations: of the latched, the read, the inner encoder, the reference and the true angle, as far as known; the
-            reference's is that from the plan as it was commanded, ahead by the lead.
-        located_deg: (n + 1,) the encoder at each location, NaN where it is unknown.
-        missing_triggers: locations without a latch of their own.
+        failure: why the motion was stopped; None if it was completed.
+        has_strayed: whether it was stopped because of a position error of the table.
+        deviations: deviations of the latched angle, the readings, the inner encoder, the reference and the true angle,
+            as far as known. The reference is compared with the commanded plan, which is ahead by the lead.
+        located_deg: (n + 1,) the encoder angle at each location, NaN if unknown.
+        missing_triggers: locations without their own latch.
         forbidden_steps: steps in which the executed path touched a forbidden cell.
-        margin_deg: from the executed path to the nearest forbidden cell, over all locations; infinite where
-            nothing is forbidden, NaN where no location is known.
+        margin_deg: minimum distance of the executed path from a forbidden cell over all locations; infinity if nothing
+            is forbidden, NaN if no location is known.
         planned_cost: Eq. (7) of the plan.
-        executed_cost: Eq. (7) of the encoder's path, its speeds and accelerations by differences; None where a
-            location is unknown.
-        latest_command_s: how late the latest command was.
+        executed_cost: Eq. (7) of the encoder's path, with speeds and accelerations by differences; None if a location
+            is unknown.
+        latest_command_s: maximum delay of a command.
         tolerance_deg: allowed encoder deviation at a location.
-        dead_line: how far the table would have run on if the line had died, and into what.
+        dead_line: the consequences if the line had failed.
     """
 
     failure: str | None
@@ -64,7 +64,7 @@ class RunVerification(NamedTuple):
 
     @property
     def worst_deg(self) -> float:
-        """The greatest deviation of the encoder at a location."""
+        """The maximum deviation of the encoder at a location."""
         encoder = [
             self.deviations[name].at_locations_deg
             for name in ("encoder", "latch", "reading")
@@ -74,7 +74,7 @@ class RunVerification(NamedTuple):
 
     @property
     def is_verified(self) -> bool:
-        """Whether the motion was carried out, within the tolerance, and touched nothing forbidden."""
+        """Whether the motion was completed, within the tolerance, without touching a forbidden region."""
         return self.failure is None and self.worst_deg <= self.tolerance_deg and not self.forbidden_steps
 
     @property
@@ -86,7 +86,7 @@ class RunVerification(NamedTuple):
             first, count = self.forbidden_steps[0], len(self.forbidden_steps)
             return f"deviated: a forbidden cell was touched in {count} steps, the first is {first}"
         if not self.worst_deg <= self.tolerance_deg:
-            return f"deviated: {self.worst_deg:.3f} deg at a location, allowed are {self.tolerance_deg:g}"
+            return f"deviated: {self.worst_deg:.3f} deg at a location; allowed: {self.tolerance_deg:g}"
         return f"verified: within {self.worst_deg:.3f} deg of the plan at every location"
 
 
@@ -97,13 +97,13 @@ def verify_run(
     lead_s: float,
     tolerance_deg: float = TOLERANCE_DEG,
 ) -> RunVerification:
-    """Return what a run came to.
+    """Verify a run.
 
     Args:
-        run_input: the plan that was run, with its map.
+        run_input: the plan that was executed, with its map.
         motion: its motion.
-        record: what was seen.
-        lead_s: how much ahead of its time the reference was commanded.
+        record: the commands and readings.
+        lead_s: how early the reference was commanded.
         tolerance_deg: allowed encoder deviation at a location.
     """
     plan, problem = run_input.plan, run_input.problem
@@ -141,7 +141,7 @@ def verify_run(
 
 
 class _Series(NamedTuple):
-    """Angles in time, and the location to which each belongs, -1 for none."""
+    """Angles over time, and the location of each, -1 for none."""
 
     times_s: FloatArray
     angles_deg: FloatArray
@@ -165,15 +165,15 @@ def _deviation(motion: TableMotion, observation: Observation) -> float:
 def _deviation_of(series: _Series, motion: TableMotion, lead_s: float) -> Deviation:
     errors = np.abs(series.angles_deg - motion.angles_at(series.times_s + lead_s))
     at_locations = errors[series.columns >= 0]
-    if not len(at_locations):  # polled only: a reading each side of a location brackets it
+    if not len(at_locations):  # polled only: a location lies between two readings
         at_locations = errors
     return Deviation(float(at_locations.max()), float(errors.max()), float(np.sqrt(np.mean(errors**2))))
 
 
 def _located(series: dict[str, _Series], motion: TableMotion) -> FloatArray:
-    """Return the encoder at each location's time: what was seen at its trigger, else between two readings.
+    """Return the encoder angle at the time of each location: the latched one, else interpolated between two readings.
 
-    A trigger that came late by some ms is brought back to its time by the plan's way in between.
+    A trigger that is late by some ms is corrected to its planned time with the planned travel.
     """
     times = motion.column_times_s
     located = np.full(len(times), np.nan)
@@ -197,7 +197,7 @@ def _missing(latches: _Series | None, count: int) -> tuple[int, ...]:
 
 
 def _forbidden_steps(run_input: RunInput, motion: TableMotion, series: Sequence[_Series]) -> tuple[int, ...]:
-    """Return the scan steps in which one of the series swept a forbidden cell; pauses do not count."""
+    """Return the scan steps in which one of the series touched a forbidden cell; pauses do not count."""
     runs, touched = run_input.problem.terms.runs, set()
     for leg in motion.legs:
         if leg.phase is not Phase.SCAN:
@@ -210,7 +210,7 @@ def _forbidden_steps(run_input: RunInput, motion: TableMotion, series: Sequence[
 
 
 def _margin_deg(configuration_map: ConfigurationMap, located_deg: FloatArray) -> float:
-    """Return the least way to a forbidden cell, which begins one sample before the forbidden sample."""
+    """Return the minimum distance to a forbidden cell. Its edge is one sample before the forbidden sample."""
     known = [(location, float(angle_deg)) for location, angle_deg in enumerate(located_deg) if np.isfinite(angle_deg)]
     ways_deg = (configuration_map.forbidden_distance_deg(*place) for place in known)
     return min(ways_deg, default=np.nan) - configuration_map.angle_step_deg

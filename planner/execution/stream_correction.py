@@ -1,9 +1,9 @@
-"""Keep a stream right while it runs: make up for commands that came late, and for a table that drifts.
+"""Correct a stream while it runs: for late commands, and for a table whose clock drifts.
 
-A stream is computed before the motion, from where the reference will be (`stream`). A command that takes effect late,
-and a table whose clock is not ours, leave the reference elsewhere. So the reference is followed by the controller's own
-rules, from each command as it was sent, and moved by what the readings of the encoder say. Where it is too far from
-where the next command expects it, the rest of the motion is streamed anew from where it is.
+A stream is computed before the motion, from the predicted reference (`stream`). A late command, or a table with another
+clock, changes the reference. Therefore the reference is simulated by the controller's rules, from each command as it
+was sent, and shifted by the deviation of the encoder readings. If it is too far from the position that the next command
+expects, the rest of the motion is streamed again from the actual position.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from planner.table.motion import Limits
 from planner.table.wire import Wire, exchanges_s
 from protocol.trapezoid import MotionCommand, ReferenceState
 
-# A reference farther than this from where the stream had it is worth a new stream.
+# A larger deviation of the reference from the stream requires a new stream.
 _SLIP_DEG = 0.03
 
 
@@ -25,39 +25,39 @@ class FollowedReference:
     """Where the reference is, by the commands that were sent and the readings of the encoder.
 
     Attributes:
-        running: the last command that was sent: when it took effect, and where the reference then was.
+        running: the last command that was sent: its time, and the reference at that time.
     """
 
     def __init__(self, drift_deg: float, drift_filter_s: float, encoder_delay_s: float) -> None:
         """Follow from rest.
 
         Args:
-            drift_deg: how far readings may be from where they were expected before the reference is moved.
-            drift_filter_s: over how long readings are averaged for that.
-            encoder_delay_s: how long after the reference's time in the stream the encoder is at the same angle.
+            drift_deg: maximum deviation of the readings from their prediction; beyond it the reference is shifted.
+            drift_filter_s: averaging time of the readings for this.
+            encoder_delay_s: delay of the encoder behind the reference of the stream.
         """
         self.running: TimedCommand | None = None
         self._drift_deg, self._encoder_delay_s = drift_deg, encoder_delay_s
         self._drift = _Drift(drift_filter_s)
 
     def latest_s(self, timed: TimedCommand) -> float:
-        """Return how late a command may be sent: the one before is good for so much longer than its step."""
+        """Return the maximum delay of a command: the previous one is valid for this much longer than its step."""
         return latest_s((self.running or timed).leg.duration_s)
 
     def sent(self, timed: TimedCommand, late_s: float) -> None:
-        """Take note that the next command was sent, and how late."""
+        """Record that the next command was sent, and its delay."""
         time_s = timed.time_s + max(0.0, late_s)
         there = timed.expected if self.running is None else self.running.reference_at(time_s)
         self.running = timed._replace(time_s=time_s, expected=there)
 
     def encoder_read(self, time_s: float, angle_deg: float) -> None:
-        """Take note of where the encoder was at a time that is known for certain."""
+        """Record the position of the encoder at a time that is known exactly."""
         running = self.running
         if running is not None and (reference_s := time_s - self._encoder_delay_s) >= running.time_s:
             self._drift.take(time_s, angle_deg - running.reference_at(reference_s).angle_deg)
 
     def moved_by_drift(self) -> float:
-        """Move the reference to where the readings have it, if that is far from where it was; return by how much."""
+        """Shift the reference by the deviation of the readings, if that is large; return the shift."""
         drift_deg = self._drift.estimate_deg
         if self.running is None or abs(drift_deg) <= self._drift_deg:
             return 0.0
@@ -68,10 +68,10 @@ class FollowedReference:
 
 
 class CorrectedStream(FollowedReference):
-    """The commands of a motion, one after the other. All times are those of the motion.
+    """The commands of a motion, one after the other. All times are in the time of the motion.
 
     Attributes:
-        corrections: where the commands were computed anew.
+        corrections: the points where the commands were computed again.
     """
 
     def __init__(
@@ -87,34 +87,34 @@ class CorrectedStream(FollowedReference):
         """Compute the stream.
 
         Args:
-            motion: what the table should do.
-            limits: greatest S and A.
-            wire: what the commands have to pass.
-            drift_deg: how far readings may be from where they were expected before the reference is moved.
-            drift_filter_s: over how long readings are averaged for that.
-            encoder_delay_s: how long after the reference's time in the stream the encoder is at the same angle.
-            run_on_deg: how far the table may run on when the line dies.
+            motion: the planned motion of the table.
+            limits: maximum S and A.
+            wire: properties of the serial line.
+            drift_deg: maximum deviation of the readings from their prediction; beyond it the reference is shifted.
+            drift_filter_s: averaging time of the readings for this.
+            encoder_delay_s: delay of the encoder behind the reference of the stream.
+            run_on_deg: maximum angle that the table may run on if the line fails.
 
         Raises:
-            StreamError: the commands follow one another faster than the wire carries them.
+            StreamError: the serial line is too slow for the commands.
         """
         super().__init__(drift_deg, drift_filter_s, encoder_delay_s)
         self.corrections: list[Correction] = []
         self._streaming = Streaming(motion, limits, wire, run_on_deg)
         self._commands = list(self._streaming.commands())
-        self._rest: Iterator[TimedCommand] = iter(())  # computed as they come due: a new stream takes time
+        self._rest: Iterator[TimedCommand] = iter(())  # computed when they are due: a new stream takes time
         self._sent = 0
         check_it_fits(self._commands, wire)
 
     @property
     def following(self) -> TimedCommand | None:
-        """The next command as it stands, not yet corrected; None when all are sent."""
+        """The next command, not yet corrected; None when all are sent."""
         if self._sent == len(self._commands):
             self._commands.extend(islice(self._rest, 1))
         return self._commands[self._sent] if self._sent < len(self._commands) else None
 
     def next(self) -> TimedCommand | None:
-        """Return the next command, computed anew where that is called for; None when all are sent."""
+        """Return the next command, computed again if necessary; None when all are sent."""
         self._correct()
         return self.following
 
@@ -124,7 +124,7 @@ class CorrectedStream(FollowedReference):
         return None if timed is None else timed.time_s - exchanges_s(wire, timed.command, latched) - wire.latency_s
 
     def sent(self, timed: TimedCommand, late_s: float) -> None:
-        """Take note that the next command was sent, and how late."""
+        """Record that the next command was sent, and its delay."""
         super().sent(timed, late_s)
         self._sent += 1
 
@@ -143,19 +143,19 @@ class CorrectedStream(FollowedReference):
 
 
 class _Drift:
-    """The mean of what the readings differ from what was expected, the latest counting most."""
+    """The mean deviation of the readings from their prediction, with the largest weight on the latest."""
 
     def __init__(self, filter_s: float) -> None:
         self._filter_s = filter_s
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Start again."""
         self.estimate_deg = 0.0
         self._last_s: float | None = None
 
     def take(self, time_s: float, difference_deg: float) -> None:
-        """Take in one difference."""
+        """Add one deviation."""
         if self._last_s is not None:
             share = min(1.0, (time_s - self._last_s) / self._filter_s)
             self.estimate_deg += share * (difference_deg - self.estimate_deg)

@@ -1,7 +1,7 @@
-"""The whole motion that the table has to make for a plan, in time: run-up, scan steps, pauses, and the stop.
+"""The whole motion of the table for a plan, over time: run-up, scan steps, pauses, and stop.
 
-Time 0 is the first scan location. A plan that starts in motion needs a run-up before it; one that ends in motion
-passes the last location, brakes and comes back to it.
+Time 0 is the first scan location. A plan that starts in motion needs a run-up. For a plan that ends in motion, the
+table passes the last location, brakes and returns to it.
 """
 
 import math
@@ -14,16 +14,16 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from planner.arrays import FloatArray
-from planner.planning.plan import Pause, Plan
+from planner.plans.plan import Pause, Plan
 from planner.table.motion import Limits
 from protocol.trapezoid import MotionCommand, ReferenceState, advance, move, time_to_rest_s
 
-# What the drive needs after its profile has ended, until the table stands.
+# Time from the end of the profile until the table stands.
 _SETTLING_S = 0.3
 
 
 class Phase(StrEnum):
-    """What goes on while the table makes a leg."""
+    """The phase of the table's motion in a leg."""
 
     RUN_UP = "run-up"
     SCAN = "scan"
@@ -35,16 +35,16 @@ class Phase(StrEnum):
 
 
 class Leg(NamedTuple):
-    """A part of the motion: constant acceleration, or where `command` is set what the profiler makes of it.
+    """A part of the motion: with constant acceleration, or with the controller's profile if `command` is set.
 
     Attributes:
-        phase: what goes on.
-        column: the scan location that it starts from.
-        start_s: when.
-        duration_s: how long.
-        start: where, and how fast.
-        acceleration_deg_s2: 0 where there is a command.
-        command: a motion from here to rest at its target.
+        phase: the phase of the motion.
+        column: the scan location at its start.
+        start_s: its start.
+        duration_s: its duration.
+        start: angle and speed at its start.
+        acceleration_deg_s2: 0 for a leg with a command.
+        command: a motion from the start to rest at its target.
     """
 
     phase: Phase
@@ -57,7 +57,7 @@ class Leg(NamedTuple):
 
     @property
     def end_s(self) -> float:
-        """When it ends."""
+        """The end of the leg."""
         return self.start_s + self.duration_s
 
     def state_at(self, time_s: float) -> ReferenceState:
@@ -68,9 +68,9 @@ class Leg(NamedTuple):
 
 
 class PauseTimes(NamedTuple):
-    """How long the robot takes in a pause of the scan: to draw the probe back, to turn, and to bring the probe near.
+    """Duration of the robot's actions in a pause of the scan: retract the probe, turn, and return the probe.
 
-    It turns while the table does, which may take longer.
+    The robot turns while the table does, which may take longer.
     """
 
     retract_s: float = 1.0
@@ -83,7 +83,7 @@ class MotionInTime(Protocol):
 
     @property
     def start_deg(self) -> float:
-        """Where the table has to stand, at rest, before the first leg."""
+        """The rest position of the table before the first leg."""
 
     @property
     def start_s(self) -> float:
@@ -104,37 +104,37 @@ class MotionInTime(Protocol):
 
 
 class TableMotion:
-    """The legs of a plan, one after the other.
+    """The legs of a plan, in order.
 
     Attributes:
         plan: the plan.
-        legs: what the table does, without gaps.
+        legs: the legs of the table, without gaps.
     """
 
     def __init__(self, plan: Plan, limits: Limits, pause_times: PauseTimes | None = None) -> None:
-        """Lay out the motion of `plan`; pauses, run-up and stop use the limits."""
+        """Create the motion of `plan`; pauses, run-up and stop use the limits."""
         self.plan = plan
         self.legs = tuple(_legs(plan, limits, pause_times or PauseTimes()))
         self._starts = [leg.start_s for leg in self.legs]
 
     @property
     def start_deg(self) -> float:
-        """Where the table has to stand, at rest, before the first leg."""
+        """The rest position of the table before the first leg."""
         return self.legs[0].start.angle_deg
 
     @property
     def start_s(self) -> float:
-        """When the first leg starts: 0, or before that by the run-up."""
+        """The start of the first leg: 0, or earlier by the run-up."""
         return self.legs[0].start_s
 
     @property
     def end_s(self) -> float:
-        """When the table stands at the last location."""
+        """The time at which the table stands at the last location."""
         return self.legs[-1].end_s
 
     @cached_property
     def column_times_s(self) -> FloatArray:
-        """(n + 1,) when each scan location is reached."""
+        """(n + 1,) the time of each scan location."""
         times = np.zeros(len(self.plan.angles_deg))
         for leg in self.legs:
             if leg.phase in {Phase.SCAN, Phase.APPROACH}:
@@ -146,7 +146,7 @@ class TableMotion:
         return float(self.column_times_s[column]) if column < len(self.column_times_s) else math.inf
 
     def leg_at(self, time_s: float) -> Leg:
-        """Return the leg at a time; the first one before it all, the last one after."""
+        """Return the leg at a time; before and after the motion, the first and the last one."""
         return self.legs[max(0, bisect_right(self._starts, time_s) - 1)]
 
     def state_at(self, time_s: float) -> ReferenceState:
@@ -202,7 +202,7 @@ def _run_up(reached: ReferenceState, rate_deg_s2: float) -> Leg:
 def pause_legs(
     pause: Pause, time_s: float, state: ReferenceState, limits: Limits, pause_times: PauseTimes
 ) -> Iterator[Leg]:
-    """Yield the legs of a pause: the table comes to rest while the probe retracts, turns, and waits for the probe."""
+    """Yield the legs of a pause: the table stops while the probe retracts, turns, and waits for the probe."""
     speed, rate = limits
     stand = MotionCommand(pause.from_angle_deg, speed, rate)
     turn = MotionCommand(pause.to_angle_deg, speed, rate)

@@ -1,44 +1,44 @@
-"""Open the port at which a table is."""
+"""Open the port of a table."""
 
 import serial
 
 from protocol import Clock, Port, PortError, WallClock
 from protocol.serial_port import open_serial_port
 
-# The emulator's port `emulator://` is found by pyserial wherever the emulator is installed; nothing of it is used here.
+# pyserial finds the emulator's URL scheme `emulator://` if the emulator is installed; nothing else of it is used here.
 _STAND_IN = "emulator"
 
 CONTROL_TIMEOUT_S = 1.0
-"""How long a control channel may take to answer while the table moves."""
+"""Maximum time for a reply of the control channel while the table moves."""
 
 
 class ScaledClock:
-    """The time of an emulator that runs faster or slower than real."""
+    """The time of an emulator that runs faster or slower than real time."""
 
     def __init__(self, clock: Clock, time_scale: float) -> None:
-        """Count `time_scale` seconds in each of `clock`'s."""
+        """Count `time_scale` seconds for each second of `clock`."""
         self._clock, self._time_scale = clock, time_scale
 
     def now_s(self) -> float:
-        """Return the emulator's seconds since an arbitrary but fixed moment."""
+        """Return the emulator's time since an arbitrary, fixed moment."""
         return self._clock.now_s() * self._time_scale
 
     def sleep_s(self, duration_s: float) -> None:
-        """Return when so much of the emulator's time has passed."""
+        """Return after this much of the emulator's time."""
         self._clock.sleep_s(duration_s / self._time_scale)
 
 
 def open_port(url: str, baud: int, timeout_s: float, time_scale: float = 1.0) -> Port:
-    """Return an open port: a device, or any URL of pyserial's.
+    """Return an open port: a device, or any pyserial URL.
 
     Args:
-        url: what to open.
-        baud: bits a second.
-        timeout_s: for reading and writing.
-        time_scale: time scale of the emulator behind the port; the port's clock then runs like the emulator's.
+        url: the device or URL.
+        baud: bits per second.
+        timeout_s: timeout for reading and writing.
+        time_scale: time scale of the emulator behind the port; the port's clock has the same scale.
 
     Raises:
-        PortError: it cannot be opened.
+        PortError: the port cannot be opened.
     """
     if _STAND_IN not in serial.protocol_handler_packages:
         serial.protocol_handler_packages.append(_STAND_IN)

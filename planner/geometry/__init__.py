@@ -1,1 +1,1 @@
-"""Shapes and distances: frames, capsules, meshes, distance fields and rays. It knows nothing of arms and tables."""
+"""Shapes and distances: frames, capsules, meshes, distance fields and rays. It is independent of arms and tables."""

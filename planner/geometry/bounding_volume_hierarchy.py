@@ -1,7 +1,7 @@
 """A bounding volume hierarchy of triangles: a balanced tree of boxes that finds the nearest triangle of a mesh.
 
-The tree is laid out as a heap: node 1 is the root, node i has the children 2i and 2i + 1, and all leaves hold the same
-number of triangles. Kernels take coordinates one by one, in millimeters.
+The tree is stored as a heap: node 1 is the root, node i has the children 2i and 2i + 1, and all leaves have the same
+number of triangles. Kernels take coordinates as single numbers, in millimeters.
 """
 
 from typing import NamedTuple
@@ -14,18 +14,18 @@ from planner.kernel import kernel
 
 _LEAF_TRIANGLES = 4
 _DEEPEST = 64
-"""Levels that the walk's list of open nodes has room for: far more triangles than memory."""
+"""Maximum depth of the list of open nodes: far more triangles than fit in memory."""
 _FLAT = 1e-20
-"""Squared sine of a triangle's angle below which it has no plane and is no more than its edges."""
+"""Squared sine of a triangle's angle below which it has no plane, only edges."""
 
 
 class BoundingVolumeHierarchy(NamedTuple):
     """A tree of boxes over triangles.
 
     Attributes:
-        triangles: `(n_leaves * m, 3, 3)`, the corners, leaf by leaf; some triangles are there twice to fill it up.
-        boxes: `(2 n_leaves, 6)`, the least and the greatest x y z of each node; the first row is unused.
-        members: `(n_leaves * m,)`, which of the given triangles each of them is.
+        triangles: `(n_leaves * m, 3, 3)`, the corners, leaf by leaf; some triangles are repeated to fill the leaves.
+        boxes: `(2 n_leaves, 6)`, the minimum and maximum x y z of each node; the first row is unused.
+        members: `(n_leaves * m,)`, index of each triangle in the input.
     """
 
     triangles: FloatArray
@@ -34,7 +34,7 @@ class BoundingVolumeHierarchy(NamedTuple):
 
 
 def bounding_volume_hierarchy(triangles: FloatArray) -> BoundingVolumeHierarchy:
-    """Return the hierarchy of triangles `(n, 3, 3)`, each node split in halves at the median of its longest side."""
+    """Return the hierarchy of triangles `(n, 3, 3)`. Each node is split at the median of its longest side."""
     n_leaves = 1
     while n_leaves * _LEAF_TRIANGLES < len(triangles):
         n_leaves *= 2
@@ -60,15 +60,15 @@ def bounding_volume_hierarchy(triangles: FloatArray) -> BoundingVolumeHierarchy:
 def nearest_triangle(
     triangles: FloatArray, boxes: FloatArray, x: float, y: float, z: float, guess: int
 ) -> tuple[float, int]:
-    """Return the squared distance in mm2 of a point from the nearest triangle, and which one that is.
+    """Return the squared distance in mm2 of a point from the nearest triangle, and the index of that triangle.
 
     Args:
-        triangles: See `BoundingVolumeHierarchy`.
-        boxes: The same.
-        x: The point.
-        y: The point.
-        z: The point.
-        guess: A triangle to begin with; the nearer it is, the less of the tree is walked.
+        triangles: see `BoundingVolumeHierarchy`.
+        boxes: see `BoundingVolumeHierarchy`.
+        x: x of the point.
+        y: y of the point.
+        z: z of the point.
+        guess: a triangle to start with; the nearer it is, the smaller is the searched part of the tree.
     """
     n_leaves = len(boxes) // 2
     per_leaf = len(triangles) // n_leaves
@@ -87,7 +87,7 @@ def nearest_triangle(
                 if distance2 < least:
                     least, nearest = distance2, triangle
         else:
-            # The last one in is the first one out, and that should be the nearer one.
+            # Last in, first out: the nearer one must be last.
             swap = box_distance2(boxes, 2 * node, x, y, z) < box_distance2(boxes, 2 * node + 1, x, y, z)
             opened[count], opened[count + 1] = 2 * node + swap, 2 * node + (not swap)
             count += 2
@@ -105,7 +105,7 @@ def box_distance2(boxes: FloatArray, node: int, x: float, y: float, z: float) ->
 
 @kernel
 def triangle_distance2(triangles: FloatArray, i: int, x: float, y: float, z: float) -> float:
-    """Return the squared distance in mm2 of a point from a triangle: from its plane above it, else from its edges."""
+    """Return the squared distance in mm2 of a point from a triangle: from its plane, or else from its edges."""
     ax, ay, az = triangles[i, 0, 0], triangles[i, 0, 1], triangles[i, 0, 2]
     bx, by, bz = triangles[i, 1, 0], triangles[i, 1, 1], triangles[i, 1, 2]
     cx, cy, cz = triangles[i, 2, 0], triangles[i, 2, 1], triangles[i, 2, 2]
@@ -116,7 +116,7 @@ def triangle_distance2(triangles: FloatArray, i: int, x: float, y: float, z: flo
     nn = nx * nx + ny * ny + nz * nz
     uu, vv = ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz
     if nn > _FLAT * uu * vv:
-        # Twice the signed areas, times the normal's length, that the point's foot cuts off at each edge.
+        # Twice the signed areas, times the normal's length, of the foot point with each edge.
         beside_v = (uy * pz - uz * py) * nx + (uz * px - ux * pz) * ny + (ux * py - uy * px) * nz
         beside_u = (py * vz - pz * vy) * nx + (pz * vx - px * vz) * ny + (px * vy - py * vx) * nz
         if beside_u >= 0.0 and beside_v >= 0.0 and beside_u + beside_v <= nn:

@@ -1,7 +1,7 @@
-"""Distance between a box and a solid or a mesh, from below, by branch and bound.
+"""Lower bound of the distance between a box and a solid or a mesh, by branch and bound.
 
-A signed distance changes by no more than the way that is gone, so what it is in the middle of a box bounds it in all of
-the box. Boxes are split until the bounds are close enough. Kernels take coordinates one by one, in millimeters.
+A signed distance changes by no more than the distance moved. So its value in the middle of a box bounds it in the whole
+box. Boxes are split until the bounds are close enough. Kernels take coordinates as single numbers, in millimeters.
 """
 
 from math import copysign, sqrt
@@ -15,10 +15,13 @@ from planner.geometry.solid import point_distance
 from planner.kernel import kernel
 
 FIELD = 3
-"""The kind of shape that is a signed distance field; the other kinds are those of `planner.geometry.solid`."""
+"""The kind of shape that is a signed distance field; the other kinds are in `planner.geometry.solid`."""
 
 FIELD_TOLERANCE_MM = 2.5
-"""How far below the distance from a field the result may be, besides what the field is off; inside, half the depth."""
+"""Maximum amount by which the result may be below the distance from a field.
+
+The error of the field is additional. Inside, it is half of the depth.
+"""
 _TOLERANCE_MM = 1e-3
 """The same for a solid."""
 _DEEPEST = 64
@@ -33,12 +36,13 @@ def _bounds(
     x: float, y: float, z: float,
     ux: float, uy: float, uz: float, vx: float, vy: float, vz: float, wx: float, wy: float, wz: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """Return a lower and an upper bound of the least distance of the box with the half axes u, v and w."""
+    """Return a lower and an upper bound of the minimum distance of the box with the half axes u, v and w."""
     if kind == FIELD:
         reach2 = ux * ux + uy * uy + uz * uz + vx * vx + vy * vy + vz * vz + wx * wx + wy * wy + wz * wz
         distance = look_up(values, levels, x, y, z)
         return distance - sqrt(reach2), distance
-    # The distance to a convex solid is a convex function, so its tangent plane bounds it, at one of the box's corners.
+    # The distance to a convex solid is a convex function. So its tangent plane is a lower bound, at one of the box's
+    # corners.
     distance, nx, ny, nz = point_distance(kind, size_0, size_1, size_2, x, y, z)
     along_u, along_v, along_w = nx * ux + ny * uy + nz * uz, nx * vx + ny * vy + nz * vz, nx * wx + ny * wy + nz * wz
     lower = distance - abs(along_u) - abs(along_v) - abs(along_w)
@@ -55,31 +59,32 @@ def box_distance_bound(
     ux: float, uy: float, uz: float, vx: float, vy: float, vz: float, wx: float, wy: float, wz: float,
     enough_mm: float,
 ) -> float:  # fmt: skip
-    """Return a lower bound in mm of the least signed distance of a box from a shape.
+    """Return a lower bound in mm of the minimum signed distance of a box from a shape.
 
-    Outside, it is at most a thousandth of a mm below that of a solid, and at most `FIELD_TOLERANCE_MM`, plus what the
-    field itself is off, below that of a field. A result at or above `enough_mm` is only known to be so.
+    Outside of a solid, it is at most a thousandth of a mm below the distance. Outside of a field, it is below by at
+    most `FIELD_TOLERANCE_MM` plus the error of the field. A result at or above `enough_mm` is only a statement that the
+    distance is sufficient.
 
     Args:
         kind: BOX, CYLINDER or CAPSULE of `planner.geometry.solid`, or FIELD.
-        size_0: As the kind has it; so are the next two.
-        size_1: See there.
-        size_2: See there.
-        values: The field, for that kind.
-        levels: The field's grids.
-        x: The middle of the box in the shape's frame.
-        y: See there.
-        z: See there.
-        ux: The first half axis of the box in the shape's frame; then follow the second and the third.
-        uy: See there.
-        uz: See there.
-        vx: See there.
-        vy: See there.
-        vz: See there.
-        wx: See there.
-        wy: See there.
-        wz: See there.
-        enough_mm: The distance from which on it is of no interest.
+        size_0: first size, depends on the kind.
+        size_1: second size.
+        size_2: third size.
+        values: the field, for that kind.
+        levels: the grids of the field.
+        x: middle of the box in the shape's frame.
+        y: its y.
+        z: its z.
+        ux: first half axis of the box in the shape's frame; the second and the third follow.
+        uy: its y.
+        uz: its z.
+        vx: second half axis.
+        vy: its y.
+        vz: its z.
+        wx: third half axis.
+        wy: its y.
+        wz: its z.
+        enough_mm: the distance that is sufficient.
     """
     lower, least = _bounds(kind, size_0, size_1, size_2, values, levels, x, y, z, ux, uy, uz, vx, vy, vz, wx, wy, wz)
     if lower >= enough_mm:
@@ -87,7 +92,7 @@ def box_distance_bound(
     u, v, w = sqrt(ux * ux + uy * uy + uz * uz), sqrt(vx * vx + vy * vy + vz * vz), sqrt(wx * wx + wy * wy + wz * wz)
     opened = np.empty((_DEEPEST, _COLUMNS))
     _open(opened, 0, x, y, z, 1.0, 1.0, 1.0, lower)
-    # Above what is enough by more than the slack, so that a box that is free gets no less than was asked.
+    # More than sufficient by the slack, so that a clear box returns no less than requested.
     least, result, count = min(least, enough_mm + 2.0 * _TOLERANCE_MM), enough_mm, 1
     while count > 0:
         count -= 1
@@ -97,7 +102,7 @@ def box_distance_bound(
             continue
         x, y, z = opened[count, 0], opened[count, 1], opened[count, 2]
         a, b, c = opened[count, _SHARE], opened[count, _SHARE + 1], opened[count, _SHARE + 2]
-        # Halve the longest side; the halves' middles are off by a half of the halved half axis.
+        # Halve the longest side; the halves' middles are offset by half of the halved half axis.
         if a * u >= b * v and a * u >= c * w:
             a *= 0.5
             dx, dy, dz = a * ux, a * uy, a * uz
@@ -119,7 +124,7 @@ def box_distance_bound(
             else:
                 _open(opened, count, px, py, pz, a, b, c, lower)
                 count += 1
-        # The last one in is the first one out, and that should be the nearer one.
+        # Last in, first out: the nearer one must be last.
         if count > 1 and opened[count - 2, _BOUND] < opened[count - 1, _BOUND]:
             _swap(opened, count - 2, count - 1)
     return result
@@ -127,9 +132,9 @@ def box_distance_bound(
 
 @kernel
 def _slack(kind: int, least: float) -> float:
-    """Return how far below the least distance met so far a bound is close enough: deep inside it need not be close.
+    """Return how far below the minimum distance found so far a bound is close enough. Deep inside it need not be close.
 
-    Of a field, all boxes are split to one size, so that the result does not depend on what was met before.
+    For a field, all boxes are split to one size, so that the result does not depend on the order.
     """
     return 0.0 if kind == FIELD else max(_TOLERANCE_MM, -0.5 * least)
 

@@ -1,7 +1,7 @@
-"""Distance between capsules: a capsule is every point within a radius of a line segment.
+"""Distance between capsules. A capsule is the set of points within a radius of a line segment.
 
-The distance of two capsules is that of their segments less both radii, so the segments are all there is to compute.
-Kernels take coordinates one by one, in millimeters, and allocate nothing.
+The distance of two capsules is the distance of their segments minus both radii, so only the segments are computed.
+Kernels take coordinates as single numbers, in millimeters, and allocate nothing.
 """
 
 from math import sqrt
@@ -16,7 +16,7 @@ _PARALLEL = 1e-16
 
 @kernel
 def clamp_unit(value: float) -> float:
-    """Return `value` moved into 0..1."""
+    """Return `value` clamped to 0..1."""
     return min(max(value, 0.0), 1.0)
 
 
@@ -27,8 +27,8 @@ def segment_distance(
 ) -> float:  # fmt: skip
     """Return the distance in mm between the segments a-b and c-d; either may be a single point.
 
-    The nearest points of the two lines are clamped to the segments in turn (Ericson, Real-Time Collision
-    Detection, section 5.1.9).
+    The nearest points of the two lines are clamped to the segments in turn (Ericson, Real-Time Collision Detection,
+    section 5.1.9).
     """
     ux, uy, uz = bx - ax, by - ay, bz - az
     vx, vy, vz = dx - cx, dy - cy, dz - cz

@@ -1,7 +1,8 @@
-"""Make one closed surface of the triangles of a file: positions decide what hangs together, harmless flaws are mended.
+"""Make one closed surface from the triangles of a file: positions define the connections, harmless flaws are repaired.
 
-What is mended changes no place of the surface: corners that are written more than once, triangles without area or
-written twice, walls between bodies that share a face, triangles that are inside out. A hole is not mended.
+Repairs do not change the shape of the surface. They concern corners that are written more than once, and triangles
+without area or written twice. They also concern walls between bodies that share a face, and triangles that are inside
+out. A hole is not repaired.
 """
 
 from typing import NamedTuple
@@ -16,7 +17,10 @@ from planner.geometry.edges import edges_of
 from planner.geometry.shells import turned_outward
 
 _WELD = 1e-5
-"""Corners nearer than this, in longest sides of the part, are one where that closes the surface: files round them."""
+"""Corners nearer than this, relative to the longest side of the part, are merged if that closes the surface.
+
+Files round their coordinates.
+"""
 _FLAT = 1e-20
 """Squared sine of a triangle's angle below which it has no area."""
 
@@ -27,7 +31,7 @@ class ClosedSurface(NamedTuple):
     Attributes:
         vertices: `(n, 3)`.
         faces: `(m, 3)`.
-        notes: What was mended, with its number.
+        notes: the repairs, each with its count.
     """
 
     vertices: FloatArray
@@ -36,10 +40,10 @@ class ClosedSurface(NamedTuple):
 
 
 def closed_surface(vertices: FloatArray, faces: IndexArray) -> ClosedSurface:
-    """Return the closed surface that triangles `(m, 3)` with corners `(n, 3)` in mm make.
+    """Return the closed surface of the triangles `(m, 3)` with corners `(n, 3)` in mm.
 
     Raises:
-        WorkpieceError: They make none; the message says where, in mm.
+        WorkpieceError: the surface is not closed; the message states where, in mm.
     """
     surface = _tidied(vertices, faces, same_position(vertices))
     if _open_edges(surface.faces).any():
@@ -57,7 +61,7 @@ def closed_surface(vertices: FloatArray, faces: IndexArray) -> ClosedSurface:
 
 def _check_that_it_is_closed(surface: ClosedSurface) -> None:
     if not len(surface.faces):
-        raise WorkpieceError("the mesh has no triangle with an area")
+        raise WorkpieceError("the mesh has no triangle with a nonzero area")
     is_open = np.flatnonzero(_open_edges(surface.faces))
     if len(is_open):
         x, y, z = edges_of(surface.faces).middle(surface.vertices, int(is_open[0]))
@@ -68,19 +72,19 @@ def _check_that_it_is_closed(surface: ClosedSurface) -> None:
 
 
 def _open_edges(faces: IndexArray) -> BoolArray:
-    """Return which edges have an odd number of triangles: a closed surface comes to each edge as often as it leaves."""
+    """Return the edges with an odd number of triangles: a closed surface has an even number at each edge."""
     return np.asarray(edges_of(faces).counts % 2 == 1)
 
 
 def _near_position(vertices: FloatArray) -> IndexArray:
-    """Return `(n,)`, for each corner the first one of those that hang together by short steps."""
+    """Return `(n,)`, for each corner the first one of those connected to it by short steps."""
     pairs = cKDTree(vertices).query_pairs(_WELD * float(np.ptp(vertices, axis=0).max()), output_type="ndarray")
     groups = connected(pairs, len(vertices))
     return np.asarray(np.unique(groups, return_index=True)[1][groups])
 
 
 def _tidied(vertices: FloatArray, faces: IndexArray, same: IndexArray) -> ClosedSurface:
-    """Return the surface with one corner where there were several, and without triangles that cannot be part of it."""
+    """Return the surface with merged corners, and without triangles that cannot be part of it."""
     corners, joined = np.unique(same[faces], return_inverse=True)
     joined = joined.reshape(faces.shape)
     distinct = (joined != np.roll(joined, 1, axis=1)).all(axis=1)
@@ -97,7 +101,7 @@ def _tidied(vertices: FloatArray, faces: IndexArray, same: IndexArray) -> Closed
 
 
 def _needles(vertices: FloatArray, faces: IndexArray) -> BoolArray:
-    """Return which triangles have corners on one line."""
+    """Return the triangles whose corners are on one line."""
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     u, v = b - a, c - a
     across = np.cross(u, v)
@@ -106,10 +110,10 @@ def _needles(vertices: FloatArray, faces: IndexArray) -> BoolArray:
 
 
 def _without_repeats(faces: IndexArray) -> BoolArray:
-    """Return which triangles to keep of those that have their three corners in common.
+    """Return which triangles to keep of those that share all three corners.
 
-    One stays where the surface needs it. None stays where bodies share a face: without it the surface is closed, with
-    it there would be a third wall at its rim.
+    One stays if the surface needs it. None stays where bodies share a face: without it the surface is closed, and with
+    it there would be a third wall at its edge.
     """
     corners = np.sort(faces, axis=1)
     _, first, group, counts = np.unique(corners, axis=0, return_index=True, return_inverse=True, return_counts=True)
@@ -120,7 +124,7 @@ def _without_repeats(faces: IndexArray) -> BoolArray:
     repeated = np.flatnonzero(counts > 1)
     edges = edges_of(faces)
     edge = edges.edge.reshape(-1, 3)
-    # How often each edge is met by triangles that are there once.
+    # How many triangles that occur once meet at each edge.
     others = np.bincount(edge[counts[group.reshape(-1)] == 1].reshape(-1), minlength=len(edges.counts))
     mine = edge[first[repeated]]
     order = np.argsort(mine, axis=None, kind="stable")
@@ -135,5 +139,5 @@ def _without_repeats(faces: IndexArray) -> BoolArray:
 
 
 def _counted(*found: tuple[int, str]) -> tuple[str, ...]:
-    """Return the texts of what there is any of, with its number."""
+    """Return the texts with a nonzero count."""
     return tuple(text.format(number, s="" if number == 1 else "s") for number, text in found if number)

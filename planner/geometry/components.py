@@ -1,4 +1,4 @@
-"""What belongs together: items that are linked in pairs, and corners at one position."""
+"""Connected components: items that are linked in pairs, and corners at one position."""
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -8,7 +8,7 @@ from planner.arrays import FloatArray, IndexArray
 
 
 def connected(pairs: IndexArray, count: int) -> IndexArray:
-    """Return `(count,)`, the number from 0 of the component that each item is in, for linked pairs `(n, 2)`."""
+    """Return `(count,)`, the component number (from 0) of each item, for linked pairs `(n, 2)`."""
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
 

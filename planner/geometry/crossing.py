@@ -1,4 +1,7 @@
-"""Where a surface crosses itself. Bodies that touch do not cross, and files round their corners."""
+"""Find the places at which a surface crosses itself.
+
+Bodies that touch do not cross, and files round their coordinates.
+"""
 
 from math import sqrt
 
@@ -14,19 +17,19 @@ from planner.kernel import kernel
 from protocol.progress import Progress
 
 _TOUCHING = 1e-6
-"""How deep, in longest sides of the mesh, bodies may reach into each other and still only touch."""
+"""Maximum depth to which bodies may penetrate each other and still only touch, relative to the mesh's longest side."""
 _ASKED_TRIANGLES = 64
 _BLOCK_TRIANGLES = 16_384
 _DEEPEST = 64
-"""Levels that the walk's list of open nodes has room for: far more triangles than memory."""
+"""Maximum depth of the list of open nodes: far more triangles than fit in memory."""
 
 
 def first_crossing(mesh: trimesh.Trimesh, progress: Progress | None = None) -> FloatArray | None:
-    """Return a point `(3,)` where an edge pierces a triangle that it has no corner in common with, or None.
+    """Return a point `(3,)` at which an edge penetrates a triangle with which it shares no corner, or None.
 
     Args:
-        mesh: The mesh.
-        progress: Called with the triangles done and all of them, between blocks.
+        mesh: the mesh.
+        progress: called with the number of finished triangles and of all triangles, between blocks.
     """
     triangles, faces = np.array(mesh.triangles, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
     hierarchy = bounding_volume_hierarchy(triangles)
@@ -55,13 +58,13 @@ def _pierced(
     triangles: FloatArray, faces: IndexArray, boxes: FloatArray, members: IndexArray,
     first: int, last: int, depth: float, pairs: IndexArray, place: FloatArray,
 ) -> int:  # fmt: skip
-    """Find the triangles that are pierced by an edge of the triangles `first` to `last`.
+    """Find the triangles that an edge of the triangles `first` to `last` penetrates.
 
-    Where one is pierced by more than `depth` inside it, the point is written to `place`. Where all are pierced at their
-    rims only, the piercing and the pierced triangle are written to `pairs`, as far as there is room.
+    If a triangle is penetrated by more than `depth` inside it, the point is written to `place`. If all are penetrated
+    only at their edges, the penetrating and the penetrated triangle are written to `pairs`, as far as there is space.
 
     Returns:
-        The number of such pairs, or -1 where `place` is written.
+        The number of such pairs, or -1 if `place` is written.
     """
     n_leaves = len(boxes) // 2
     per_leaf = len(members) // n_leaves
@@ -91,7 +94,7 @@ def _pierced(
 
 @kernel
 def _meets(triangles: FloatArray, a: int, boxes: FloatArray, node: int) -> bool:
-    """Return whether the box of a triangle meets that of a node."""
+    """Return whether the box of a triangle intersects that of a node."""
     for axis in range(3):
         p, q, r = triangles[a, 0, axis], triangles[a, 1, axis], triangles[a, 2, axis]
         if max(p, q, r) < boxes[node, axis] or min(p, q, r) > boxes[node, 3 + axis]:
@@ -112,9 +115,9 @@ def _has_common_corner(faces: IndexArray, a: int, b: int) -> bool:
 def _depth_of_piercing(
     triangles: FloatArray, faces: IndexArray, a: int, b: int, depth: float, place: FloatArray
 ) -> float:
-    """Return how far inside triangle b the edges of triangle a pierce it, -inf if they have a corner in common.
+    """Return how far inside triangle b the edges of triangle a penetrate it; -inf if they share a corner.
 
-    It is the greatest of the three, or the first that is above `depth`; then `place` is where.
+    The result is the maximum of the three, or the first value above `depth`; then `place` is that point.
     """
     deepest = -np.inf
     if _has_common_corner(faces, a, b):
@@ -128,9 +131,9 @@ def _depth_of_piercing(
 
 @kernel
 def _piercing(triangles: FloatArray, a: int, corner: int, b: int, depth: float, place: FloatArray) -> float:
-    """Return how far inside triangle b an edge of triangle a passes through its plane, and write where to `place`.
+    """Return how far inside triangle b an edge of triangle a crosses its plane, and write the point to `place`.
 
-    It is negative outside the triangle, and -inf where the edge does not reach from `depth` before the plane to
+    The result is negative outside the triangle. It is -inf if the edge does not reach from `depth` before the plane to
     `depth` behind it.
     """
     ax, ay, az = triangles[b, 0, 0], triangles[b, 0, 1], triangles[b, 0, 2]
@@ -163,10 +166,10 @@ def _piercing(triangles: FloatArray, a: int, corner: int, b: int, depth: float, 
 
 
 def _first_overlap(mesh: trimesh.Trimesh, pairs: IndexArray, depth: float) -> FloatArray | None:
-    """Return a point at which bodies overlap whose edges pierce each other's triangles at their rims only, or None.
+    """Return a point at which bodies overlap whose edges penetrate each other's triangles only at the edges, or None.
 
-    Bodies that lie against each other do so, inside or outside, and bodies that overlap with sides in one plane. Of
-    the latter, one body has triangles inside the other one and others outside.
+    Bodies that are in contact do so, inside or outside, and so do bodies that overlap with coplanar sides. In the
+    latter case, one body has some triangles inside the other one and some outside.
     """
     faces, triangles = np.asarray(mesh.faces), np.asarray(mesh.triangles)
     patches = connected(edges_of(faces).shared_by_two()[0], len(faces))
@@ -180,7 +183,7 @@ def _first_overlap(mesh: trimesh.Trimesh, pairs: IndexArray, depth: float) -> Fl
         lift = 10.0 * depth * across[asked] / doubled_area[asked, np.newaxis]
         turns = np.abs(solid_angles(triangles[patches == other], np.concatenate((middles + lift, middles - lift))))
         sides = turns.reshape(2, -1) / (4.0 * np.pi)
-        # A triangle that lies on the other body has one side inside and one outside.
+        # A triangle in contact with the other body has one side inside and one outside.
         if sides.min(axis=0).max() > 0.9 and sides.max(axis=0).min() < 0.1:
             return np.asarray(middles[np.argmax(sides.min(axis=0))])
     return None

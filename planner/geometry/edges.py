@@ -1,4 +1,4 @@
-"""The edges of a triangle mesh: which triangles share one, and which way each of them runs along it."""
+"""The edges of a triangle mesh: which triangles share an edge, and their direction along it."""
 
 from typing import NamedTuple
 
@@ -8,13 +8,13 @@ from planner.arrays import BoolArray, FloatArray, IndexArray
 
 
 class Edges(NamedTuple):
-    """The three sides of each triangle, side by side with the edges that they lie on.
+    """The three sides of each triangle, with their edges.
 
     Attributes:
         ends: `(n_edges, 2)`, the vertices, the smaller index first.
         edge: `(3 n,)`, the edge of each side; the sides of triangle i are 3 i to 3 i + 2.
         forward: `(3 n,)`, whether the triangle runs along the edge from its first end to its second.
-        counts: `(n_edges,)`, how many triangles share the edge.
+        counts: `(n_edges,)`, number of triangles at the edge.
     """
 
     ends: IndexArray
@@ -23,7 +23,7 @@ class Edges(NamedTuple):
     counts: IndexArray
 
     def shared_by_two(self) -> tuple[IndexArray, BoolArray]:
-        """Return the pairs of triangles `(m, 2)` that alone share an edge, and whether both run the same way `(m,)`."""
+        """Return the pairs of triangles `(m, 2)` that alone share an edge, and whether both have the same direction."""
         shared = np.flatnonzero(self.counts[self.edge] == 2)
         sides = shared[np.argsort(self.edge[shared], kind="stable")].reshape(-1, 2)
         return sides // 3, self.forward[sides[:, 0]] == self.forward[sides[:, 1]]

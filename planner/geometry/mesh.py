@@ -1,4 +1,4 @@
-"""Load the mesh of a workpiece, and refuse one that cannot be meant."""
+"""Load the mesh of a workpiece, and refuse one that is not plausible."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +14,7 @@ from planner.geometry.crossing import first_crossing
 from planner.geometry.mesh_file import read_mesh_file
 from protocol.progress import Progress
 
-# A part that a probe with a 60 mm line and an arm of 650 mm reach can be meant for.
+# Plausible sizes of a part for a probe with a line of 60 mm and an arm with a reach of 650 mm.
 SMALLEST_MM = 10.0
 LARGEST_MM = 1000.0
 
@@ -22,7 +22,7 @@ _ASKED = {"m": "meters", "cm": "centimeters", "inch": "inches"}
 
 
 def radius_about_axis_mm(mesh: trimesh.Trimesh, T_TW: FloatArray) -> float:
-    """Return how far the mesh reaches from the table's axis when placed at T_TW `(4, 4)`."""
+    """Return the maximum distance of the mesh from the table's axis when placed at T_TW `(4, 4)`."""
     vertices = np.asarray(mesh.vertices) @ T_TW[:3, :3].T + T_TW[:3, 3]
     return float(np.hypot(vertices[:, 0], vertices[:, 1]).max())
 
@@ -33,17 +33,18 @@ def load_mesh(
     say: Callable[[str], None] | None = None,
     progress: Progress | None = None,
 ) -> trimesh.Trimesh:
-    """Return the mesh of an STL, PLY or OBJ file, in mm, when it is sound.
+    """Return the mesh of an STL, PLY or OBJ file, in mm, if it is valid.
 
     Args:
-        file: The file.
-        unit: Of its lengths, one of `MILLIMETERS`; without one they are taken for mm, and a size that tells of another
-            unit is asked about.
-        say: Called with one line when harmless flaws were mended.
-        progress: Called with the triangles done and all of them while the surface is checked for crossings.
+        file: the file.
+        unit: its unit of length, one of `MILLIMETERS`. Without a unit, mm is assumed, and the message about a size that
+            fits another unit suggests that unit.
+        say: called with one line if harmless flaws were repaired.
+        progress: called with the number of checked triangles and of all triangles during the check for crossings.
 
     Raises:
-        WorkpieceError: It cannot be read, is empty, open or crosses itself, or its size cannot be meant.
+        WorkpieceError: the file cannot be read, the mesh is empty, open or crosses itself, or its size is not
+            plausible.
     """
     content = read_mesh_file(file)
     try:
@@ -59,10 +60,10 @@ def load_mesh(
 def sound_mesh(
     vertices: FloatArray, faces: IndexArray, unit: str | None = None, progress: Progress | None = None
 ) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
-    """Return the mesh of triangles `(m, 3)` with corners `(n, 3)` in mm, and what was mended in it.
+    """Return the mesh of triangles `(m, 3)` with corners `(n, 3)` in mm, and its repairs.
 
     Raises:
-        WorkpieceError: See `load_mesh`.
+        WorkpieceError: see `load_mesh`.
     """
     if len(faces) == 0:
         raise WorkpieceError("the mesh is empty")
@@ -82,15 +83,15 @@ def sound_mesh(
 
 
 def size_fault(extents_mm: FloatArray, *, ask: bool = True) -> str | None:
-    """Return why a workpiece with sides `(3,)` is of no size that can be meant, or None.
+    """Return why a workpiece with sides `(3,)` has no plausible size, or None.
 
     Args:
-        extents_mm: The sides.
-        ask: Whether to ask about another unit of length that would make sense.
+        extents_mm: the sides.
+        ask: whether to suggest another unit of length that fits.
     """
     largest_mm = float(np.max(extents_mm))
     if SMALLEST_MM <= largest_mm <= LARGEST_MM:
         return None
-    fault = f"the workpiece's longest side is {largest_mm:g} mm; allowed is {SMALLEST_MM:g} to {LARGEST_MM:g} mm"
+    fault = f"the workpiece's longest side is {largest_mm:g} mm; allowed: {SMALLEST_MM:g} to {LARGEST_MM:g} mm"
     others = [name for unit, name in _ASKED.items() if SMALLEST_MM <= largest_mm * MILLIMETERS[unit] <= LARGEST_MM]
     return f"{fault}; is it in {' or '.join(others)}?" if ask and others else fault

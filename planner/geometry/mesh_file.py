@@ -1,6 +1,6 @@
-"""Read the triangles of an STL, OBJ or PLY file: the corners' positions and nothing else of what these files can hold.
+"""Read the triangles of an STL, OBJ or PLY file: only the positions of the corners.
 
-Names, comments, normals, colors, textures and materials are skipped, in whatever encoding they are written.
+Names, comments, normals, colors, textures and materials are skipped, in any encoding.
 """
 
 import io
@@ -26,12 +26,12 @@ _ASCII = bytes(code if code < 128 else ord("?") for code in range(256))
 
 
 class MeshFile(NamedTuple):
-    """What a file holds.
+    """The content of a file.
 
     Attributes:
-        vertices: `(n, 3)`, as written; may hold numbers that are not finite.
-        faces: `(m, 3)`, indices of vertices; all of them exist.
-        notes: What was read over, such as bytes after the last triangle.
+        vertices: `(n, 3)`, as written; may contain numbers that are not finite.
+        faces: `(m, 3)`, indices of existing vertices.
+        notes: ignored content, such as bytes after the last triangle.
     """
 
     vertices: FloatArray
@@ -40,10 +40,10 @@ class MeshFile(NamedTuple):
 
 
 def read_mesh_file(file: Path) -> MeshFile:
-    """Return the triangles of a file; its name's ending says which format it has.
+    """Return the triangles of a file; the suffix of its name determines the format.
 
     Raises:
-        WorkpieceError: It is missing, is empty, or is not what its ending says; the message names the file.
+        WorkpieceError: the file is missing, empty, or not of the format of its suffix. The message names the file.
     """
     readers = {".stl": _read_stl, ".obj": _read_obj, ".ply": _read_ply}
     reader = readers.get(file.suffix.lower())
@@ -60,17 +60,17 @@ def read_mesh_file(file: Path) -> MeshFile:
 def _read_stl(content: bytes) -> MeshFile:
     if not content:
         raise WorkpieceError("the file is empty")
-    # Some binary files begin with "solid" too, but no text holds a zero byte.
+    # Some binary files begin with "solid" too, but a text contains no zero byte.
     if content.lstrip()[:5].lower() == b"solid" and b"\0" not in content[:1024]:
         return _read_text_stl(content)
     if len(content) < _STL_HEADER_BYTES:
-        raise WorkpieceError("this is not an STL file: it neither begins with 'solid' nor has a binary header")
+        raise WorkpieceError("this is not an STL file: it has neither 'solid' at its start nor a binary header")
     count = int.from_bytes(content[80:84], "little")
     excess = len(content) - _STL_HEADER_BYTES - count * _STL_TRIANGLE.itemsize
     if excess < 0:
         raise WorkpieceError(
-            f"the file ends too early: its header announces {count} triangles, which need"
-            f" {len(content) - excess} bytes, and it has {len(content)}; write it again"
+            f"the file ends too early: its header specifies {count} triangles, which need"
+            f" {len(content) - excess} bytes, and it has {len(content)}; export it again"
         )
     triangles = np.frombuffer(content, _STL_TRIANGLE, count, _STL_HEADER_BYTES)["corners"]
     notes = (f"ignored {excess} bytes after the last triangle",) if excess else ()
@@ -99,7 +99,7 @@ def _is_bad_stl_vertex(line: bytes) -> bool:
 
 
 def _numbers(words: list[bytes], count: int) -> list[float] | None:
-    """Return the first `count` words as numbers, or None where they are not."""
+    """Return the first `count` words as numbers, or None if they are not numbers."""
     try:
         numbers = [float(word) for word in words[:count]]
     except ValueError:
@@ -131,7 +131,7 @@ def _read_obj(content: bytes) -> MeshFile:
 
 
 def _obj_corners(words: list[bytes], n_vertices: int, line: int) -> list[int]:
-    """Return the vertices, from 0, of a face line; negative numbers count back from the last vertex read so far."""
+    """Return the vertices, from 0, of a face line; negative numbers count back from the last vertex so far."""
     try:
         numbers = [int(word.partition(b"/")[0]) for word in words]
     except ValueError:
@@ -147,7 +147,7 @@ def _obj_corners(words: list[bytes], n_vertices: int, line: int) -> list[int]:
 
 
 def _check_corners(polygon: list[int], n_vertices: int, place: str, first: int) -> None:
-    """Raise where a face has fewer than three corners, or one that is not a vertex; the file counts from `first`."""
+    """Raise if a face has fewer than three corners, or one that is not a vertex; the file counts from `first`."""
     if len(polygon) < 3:
         raise WorkpieceError(f"{place}: a face has {len(polygon)} corners; three are needed")
     for corner in polygon:
@@ -163,7 +163,7 @@ def _read_ply(content: bytes) -> MeshFile:
     content = _in_ascii(content)
     announced = sum(map(int, _PLY_COUNT.findall(content.partition(_PLY_HEADER_END)[0])))
     if announced > len(content):
-        raise WorkpieceError(f"the file ends too early: its header announces {announced} lines of data")
+        raise WorkpieceError(f"the file ends too early: its header specifies {announced} lines of data")
     try:
         elements = {element.name: element for element in PlyData.read(io.BytesIO(content)).elements}
     except PlyElementParseError as error:
@@ -183,7 +183,7 @@ def _read_ply(content: bytes) -> MeshFile:
 
 
 def _in_ascii(content: bytes) -> bytes:
-    """Return a PLY file with question marks for what is not ASCII in its text: comments may be in any encoding."""
+    """Return a PLY file with question marks for non-ASCII text: comments may have any encoding."""
     header, mark, data = content.partition(_PLY_HEADER_END)
     header = header.translate(_ASCII)
     return header + mark + (data.translate(_ASCII) if b"format ascii" in header else data)

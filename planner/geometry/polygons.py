@@ -10,10 +10,12 @@ from planner.errors import WorkpieceError
 
 
 def triangulated(vertices: FloatArray, polygons: Sequence[Sequence[int]]) -> IndexArray:
-    """Return the triangles `(n, 3)` of nearly flat polygons with three or more corners each, in their order and sense.
+    """Return the triangles `(n, 3)` of nearly flat polygons with three or more corners each.
+
+    Order and orientation stay the same.
 
     Raises:
-        WorkpieceError: A polygon crosses itself, so that no triangles cover it.
+        WorkpieceError: a polygon crosses itself, so no triangles cover it.
     """
     counts = np.fromiter((len(polygon) for polygon in polygons), dtype=np.int64, count=len(polygons))
     firsts = np.concatenate(([0], np.cumsum(counts - 2)))
@@ -34,24 +36,22 @@ def _as_they_are(_vertices: FloatArray, triangles: IndexArray) -> IndexArray:
 
 
 def _quads_split(vertices: FloatArray, quads: IndexArray) -> IndexArray:
-    """Return `(n, 2, 3)`: each quad along its first diagonal, or along the second where only that one is inside."""
+    """Return `(n, 2, 3)`: each quad divided at its first diagonal, or at the second if only that one is inside."""
     a, b, c, d = (vertices[quads[:, corner]] for corner in range(4))
-    with np.errstate(
-        over="ignore", invalid="ignore"
-    ):  # coordinates that cannot be meant are refused by the mesh's size
+    with np.errstate(over="ignore", invalid="ignore"):  # implausible coordinates are refused by the size of the mesh
         along_first = np.sum(np.cross(b - a, c - a) * np.cross(c - a, d - a), axis=1) >= 0.0
     first, second = quads[:, [[0, 1, 2], [0, 2, 3]]], quads[:, [[0, 1, 3], [1, 2, 3]]]
     return np.where(along_first[:, np.newaxis, np.newaxis], first, second)
 
 
 def _polygon_split(vertices: FloatArray, polygon: IndexArray) -> IndexArray:
-    """Return `(n - 2, 3)`: one polygon, by cutting its ears off in its own plane."""
+    """Return `(n - 2, 3)`: one polygon, by ear clipping in its own plane."""
     corners = vertices[polygon] - vertices[polygon[0]]
     normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)  # Newell's, twice the area long
     length = float(np.linalg.norm(normal))
-    if not length > 0.0:  # no area, or a corner that is not a finite number: whoever asked finds that in the triangles
+    if not length > 0.0:  # no area, or a corner that is not finite: the caller detects this in the triangles
         return np.array([(polygon[0], *polygon[i : i + 2]) for i in range(1, len(polygon) - 1)])
-    # Any axis that is far from the normal spans the plane with it.
+    # Any axis that is far from the normal defines the plane together with it.
     u = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
     u /= np.linalg.norm(u)
     flat = np.column_stack((corners @ u, corners @ np.cross(normal / length, u)))

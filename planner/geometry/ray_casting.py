@@ -1,8 +1,8 @@
-"""Rays against the triangles of a workpiece: what a ray meets first, and whether the way between two points is free.
+"""Cast rays at the triangles of a workpiece: what a ray hits first, and whether two points see each other.
 
-Embree finds the triangle in single precision; where the ray meets that triangle's plane is then computed in double
-precision. So a hit lies on the surface to far below a micrometer, and single precision only decides which of two
-neighboring triangles a ray through their common edge belongs to.
+Embree finds the triangle in single precision. The intersection of the ray with the plane of that triangle is then
+computed in double precision. So a hit is on the surface to far below a micrometer. Single precision only decides to
+which of two neighboring triangles a ray through their common edge belongs.
 """
 
 from typing import NamedTuple
@@ -15,16 +15,16 @@ from embreex.rtcore_scene import EmbreeScene
 
 from planner.arrays import BoolArray, FloatArray, IndexArray
 
-# How far off its surface a point's own ray starts, so that it does not meet the triangle that it starts from.
+# Distance from the surface at which a point's own ray starts, so that it does not hit its own triangle.
 _LIFT_MM = 0.01
 
 
 class Hits(NamedTuple):
-    """What rays meet first.
+    """The first hits of rays.
 
     Attributes:
-        triangles: `(n,)`, -1 where a ray meets nothing.
-        distances_mm: `(n,)` along each ray, in units of its direction's length; NaN where it meets nothing.
+        triangles: `(n,)`, -1 for a ray without a hit.
+        distances_mm: `(n,)` along each ray, in units of its direction's length; NaN without a hit.
     """
 
     triangles: IndexArray
@@ -32,27 +32,27 @@ class Hits(NamedTuple):
 
 
 class RayCaster:
-    """A closed surface that rays can be cast at.
+    """A closed surface for ray casting.
 
     Attributes:
-        normals: `(n_triangles, 3)` outward unit normals; zero for a triangle without area, which no ray meets.
+        normals: `(n_triangles, 3)` outward unit normals; zero for a triangle without area, which no ray hits.
     """
 
     def __init__(self, mesh: trimesh.Trimesh) -> None:
-        """Take over a mesh in mm."""
+        """Store a mesh in mm."""
         triangles = np.asarray(mesh.triangles, dtype=np.float64)
         across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         doubled_area = np.linalg.norm(across, axis=1, keepdims=True)
         self.normals: FloatArray = np.divide(across, doubled_area, out=np.zeros_like(across), where=doubled_area > 0.0)
         self._offsets_mm = np.einsum("ij,ij->i", self.normals, triangles[:, 0])
-        # About the middle of the part, coordinates are smallest and single precision is finest.
+        # Relative to the middle of the part, coordinates are smallest and single precision is finest.
         self._middle_mm = np.asarray(mesh.bounds, dtype=np.float64).mean(axis=0)
         self._scene = EmbreeScene(robust=True)
         vertices = np.asarray(mesh.vertices, dtype=np.float64) - self._middle_mm
         TriangleMesh(self._scene, vertices.astype(np.float32), np.asarray(mesh.faces, dtype=np.int32))
 
     def first_hits(self, origins: FloatArray, directions: FloatArray) -> Hits:
-        """Return what each ray meets first.
+        """Return the first hit of each ray.
 
         Args:
             origins: `(n, 3)` in mm.
@@ -68,7 +68,7 @@ class RayCaster:
         return Hits(triangles, distances)
 
     def can_see(self, points: FloatArray, normals: FloatArray, eyes: FloatArray) -> BoolArray:
-        """Return whether each eye `(n, 3)` sees its point `(n, 3)` of the surface with that outward normal `(n, 3)`."""
+        """Return whether each eye `(n, 3)` sees its point `(n, 3)` of the surface with outward normal `(n, 3)`."""
         ways = eyes - points
         in_front: BoolArray = np.einsum("ij,ij->i", normals, ways) > _LIFT_MM
         asked = np.flatnonzero(in_front)
@@ -76,7 +76,7 @@ class RayCaster:
             return in_front
         starts = points[asked] + _LIFT_MM * normals[asked]
         ways = eyes[asked] - starts
-        # The directions are not of length 1, so 1 is where the eye is.
+        # The directions are not of length 1: the eye is at distance 1.
         ends = np.ones(len(asked), dtype=np.float32)
         blocker = self._scene.run(self._single(starts), ways.astype(np.float32), dists=ends, query="OCCLUDED")
         in_front[asked] = np.asarray(blocker) < 0

@@ -1,12 +1,12 @@
-"""The shells of a closed surface, each of its connected parts, and which side of each is matter.
+"""The shells of a closed surface (its connected parts), and the material side of each.
 
-Which way the triangles of a shell are written says little: many programs write them inside out. What surrounds a
-shell says more:
+The orientation of a shell's triangles is not reliable: many programs write it inside out. The surrounding shells give
+more information:
 
-- A shell that nothing surrounds is the outside of a body, whichever way it is written.
-- So is a shell in the cavity of a body.
-- A shell in the matter of a body bounds a cavity if it is written the other way round than that body's own shell.
-  Written the same way it is a body within a body: both stay matter, so that none is ever taken for free space.
+- A shell that nothing surrounds is the outside of a body, with either orientation.
+- The same applies to a shell in the cavity of a body.
+- A shell in the material of a body bounds a cavity if its orientation is opposite to that of the body's own shell.
+  With the same orientation, it is a body within a body: both stay material, so that none is taken for free space.
 """
 
 import numpy as np
@@ -18,18 +18,18 @@ from planner.geometry.edges import Edges, edges_of
 from planner.geometry.winding_number import solid_angles
 
 _ASKED_POINTS = 24
-"""Places of a shell that are asked whether they lie inside another: some may lie on it, where bodies touch."""
+"""Number of points of a shell that are tested for being inside another shell: some may be on it, where bodies touch."""
 
 
 def turned_outward(vertices: FloatArray, faces: IndexArray) -> BoolArray:
-    """Return which triangles `(n,)` must be turned round so that all of them have matter behind them.
+    """Return which triangles `(n,)` must be reversed so that all of them have the material behind them.
 
     Args:
-        vertices: `(m, 3)`; those at one position are one.
+        vertices: `(m, 3)`; equal positions are one vertex.
         faces: `(n, 3)`, a closed surface.
 
     Raises:
-        WorkpieceError: A shell has no two sides, or bodies touch such that it cannot be said what is inside.
+        WorkpieceError: a shell has no two sides, or bodies touch so that the inside is ambiguous.
     """
     faces = same_position(vertices)[faces]
     edges = edges_of(faces)
@@ -44,10 +44,10 @@ def turned_outward(vertices: FloatArray, faces: IndexArray) -> BoolArray:
 
 
 def _turned_to_agree(edges: Edges, patches: IndexArray) -> BoolArray:
-    """Return which triangles run the other way round than most of their patch."""
+    """Return the triangles with an orientation opposite to most of their patch."""
     pairs, disagree = edges.shared_by_two()
     n = len(patches)
-    # Each triangle twice, as it is and turned round; what can go together hangs together.
+    # Each triangle twice, as it is and reversed; compatible ones are connected.
     other = pairs[:, 1] + n * disagree
     as_it_is = np.column_stack((pairs[:, 0], other))
     sides = connected(np.concatenate((as_it_is, (as_it_is + n) % (2 * n))), 2 * n)
@@ -58,7 +58,7 @@ def _turned_to_agree(edges: Edges, patches: IndexArray) -> BoolArray:
 
 
 def _shells(edges: Edges, patches: IndexArray) -> IndexArray:
-    """Return `(n,)`, the shell of each triangle: its patch if that is closed, else with open patches beside it."""
+    """Return `(n,)`, the shell of each triangle: its patch if it is closed, else with adjacent open patches."""
     crowded = np.flatnonzero(edges.counts[edges.edge] > 2)
     if not len(crowded):
         return patches
@@ -66,7 +66,7 @@ def _shells(edges: Edges, patches: IndexArray) -> IndexArray:
     met, counts = np.unique(at, axis=0, return_counts=True)
     is_open = np.zeros(patches.max() + 1, dtype=np.bool_)
     is_open[met[counts % 2 == 1, 1]] = True
-    # Around one edge, the open patches belong together.
+    # Open patches at the same edge belong together.
     met = met[is_open[met[:, 1]]]
     neighbors = np.column_stack((met[:-1], met[1:]))
     neighbors = neighbors[neighbors[:, 0] == neighbors[:, 2]][:, [1, 3]]
@@ -81,7 +81,7 @@ def _check_that_sides_agree(vertices: FloatArray, edges: Edges, shells: IndexArr
     if len(excess):
         x, y, z = edges.middle(vertices, int(at[excess[0]] // (shells.max() + 1)))
         raise WorkpieceError(
-            f"the triangles disagree on which side is out, at {len(excess)} edges, the first near"
+            f"the triangles are oriented inconsistently, at {len(excess)} edges, the first near"
             f" x {x:.3f}, y {y:.3f}, z {z:.3f} mm"
         )
 
@@ -92,7 +92,7 @@ def _volumes(vertices: FloatArray, faces: IndexArray, shells: IndexArray) -> Flo
 
 
 def _matter(vertices: FloatArray, faces: IndexArray, shells: IndexArray, volumes: FloatArray) -> IndexArray:
-    """Return `(n_shells,)`: 1 where a shell has matter inside, -1 where it bounds a cavity."""
+    """Return `(n_shells,)`: 1 for a shell with material inside, -1 for the boundary of a cavity."""
     n = len(volumes)
     inside = _inside(vertices, faces, shells, np.abs(volumes))
     written = np.where(volumes < 0.0, -1, 1)
@@ -103,7 +103,7 @@ def _matter(vertices: FloatArray, faces: IndexArray, shells: IndexArray, volumes
             depths[shell] = 1
             continue
         parent = around[np.argmin(np.abs(volumes[around]))]
-        if depths[parent] > 0:  # in matter, so the way that its body is written tells
+        if depths[parent] > 0:  # in material: the orientation relative to its body decides
             senses[shell] = senses[parent]
             steps[shell] = written[shell] * senses[parent]
         depths[shell] = depths[parent] + steps[shell]
@@ -111,7 +111,7 @@ def _matter(vertices: FloatArray, faces: IndexArray, shells: IndexArray, volumes
 
 
 def _inside(vertices: FloatArray, faces: IndexArray, shells: IndexArray, sizes: FloatArray) -> BoolArray:
-    """Return `(n_shells, n_shells)`: whether the first shell lies inside the second, larger one."""
+    """Return `(n_shells, n_shells)`: whether the first shell is inside the second, larger one."""
     n = len(sizes)
     inside = np.zeros((n, n), dtype=np.bool_)
     if n == 1:
@@ -125,6 +125,7 @@ def _inside(vertices: FloatArray, faces: IndexArray, shells: IndexArray, sizes: 
     for inner, outer in np.argwhere(boxed & (sizes[:, np.newaxis] < sizes)):
         chosen = parts[inner][:: max(1, len(parts[inner]) // _ASKED_POINTS)][:_ASKED_POINTS]
         windings = np.abs(solid_angles(triangles[parts[outer]], triangles[chosen].mean(axis=1))) / (4.0 * np.pi)
-        # Half a turn is seen from a point on the shell itself; the point farthest from that tells.
+        # A point on the shell itself sees half of the solid angle; the point with the largest deviation from that
+        # decides.
         inside[inner, outer] = windings[np.argmax(np.abs(windings - 0.5))] > 0.5
     return inside

@@ -1,7 +1,7 @@
 """The signed distance of a mesh on nested regular grids: positive outside, negative inside, in mm.
 
-The distance is that of the nearest triangle, exactly; the sign is the winding number's along each line of a grid. A
-field is built once and kept on disk under the mesh's content and the resolution; kernels look it up.
+The distance to the nearest triangle is exact. The sign is that of the winding number along each line of a grid. A field
+is computed once and stored on disk under the digest of the mesh and the resolution. Kernels read it.
 """
 
 import hashlib
@@ -25,26 +25,26 @@ from protocol.progress import Progress
 
 _MOST_POINTS = 4_000_000
 _RULES = b"nested grids, any winding, signs by the nesting of shells"
-"""Part of a stored field's name, so that fields built by other rules are not read back."""
+"""Part of the name of a stored field, so that fields of other versions are not read."""
 _COARSER = 3
-"""How many spacings of a level the next one has for its own."""
+"""Ratio of the spacings of a level and the next finer one."""
 _BESIDE_POINTS = 5
-"""Points that a level reaches beyond the one before, on each side."""
+"""Number of points by which a level extends beyond the previous one, on each side."""
 _REACH_MM = 300.0
-"""How far the levels reach beyond the mesh: the radius of an arm's part, and a comfortable clearance."""
+"""Distance by which the levels extend beyond the mesh: the radius of an arm's part, plus a comfortable clearance."""
 _SPACING, _SHAPE = 3, 4
 """Columns of the levels."""
 _STEP = 0.25
-"""Shortest stride of the walk along a segment, in grid spacings."""
+"""Minimum step of the walk along a segment, in grid spacings."""
 
 
 class SignedDistanceField(NamedTuple):
-    """Signed distances on nested grids: a fine one around the mesh, and coarser ones that reach farther.
+    """Signed distances on nested grids: a fine one around the mesh, and coarser ones with a larger extent.
 
     Attributes:
         values_mm: `(n,)` float32, the signed distances at the grids' points, grid after grid, z running fastest.
-        levels: `(n_levels, 7)`, of each grid the first point in the mesh's frame, the spacing, both in mm, and the
-            number of points along x, y and z; the finest grid comes first.
+        levels: `(n_levels, 7)`, for each grid its first point in the mesh's frame and its spacing, both in mm, and its
+            size. The size is the number of points along x, y and z. The finest grid is first.
     """
 
     values_mm: NDArray[np.float32]
@@ -62,32 +62,32 @@ class SignedDistanceField(NamedTuple):
 
 
 NO_FIELD = SignedDistanceField(np.zeros(8, np.float32), np.array([[0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 2.0]]))
-"""What a kernel is handed where no part is a mesh."""
+"""The field for kernels if no part is a mesh."""
 
 
 def build_field(mesh: trimesh.Trimesh, spacing_mm: float, progress: Progress | None = None) -> SignedDistanceField:
-    """Return the signed distance field of a watertight mesh; the finest grid reaches a cell beyond it on each side.
+    """Return the signed distance field of a watertight mesh. The finest grid extends one cell beyond it on each side.
 
-    The values are exact to the rounding of float32, but for points outside within a thousandth of the spacing of the
-    surface, which count as inside. So no value is above the true one. Which side of the surface is inside follows from
-    how its shells are nested (see `planner.geometry.shells`), whichever way round their triangles are written.
+    The values are exact to the rounding of float32. The exception are points outside within a thousandth of the spacing
+    of the surface, which count as inside. So no value is above the true one. The nesting of the shells determines the
+    inside (see `planner.geometry.shells`), for any orientation of the triangles.
 
     Args:
-        mesh: The mesh, in mm.
-        spacing_mm: The finest grid's spacing.
-        progress: Called with the points done and all points, between blocks.
+        mesh: the mesh, in mm.
+        spacing_mm: spacing of the finest grid.
+        progress: called with the number of finished points and of all points, between blocks.
 
     Raises:
-        ValueError: The spacing is not positive, or so small that the grid would not fit in memory.
-        WorkpieceError: The surface has no inside.
+        ValueError: the spacing is not positive, or so small that the grid would not fit in memory.
+        WorkpieceError: the surface has no inside.
     """
     if not spacing_mm > 0.0:
-        raise ValueError(f"the spacing of a distance field is {spacing_mm:g} mm, it must be above 0")
+        raise ValueError(f"the spacing of a distance field is {spacing_mm:g} mm; it must be above 0")
     lower, upper = np.asarray(mesh.bounds, dtype=np.float64)
     shape = np.ceil((upper - lower) / spacing_mm).astype(int) + 3
     if np.prod(shape.astype(float)) > _MOST_POINTS:
         raise ValueError(
-            f"a distance field of {shape[0]} x {shape[1]} x {shape[2]} points is too large, choose a spacing above "
+            f"a distance field of {shape[0]} x {shape[1]} x {shape[2]} points is too large; choose a spacing above "
             f"{spacing_mm:g} mm"
         )
     levels = _levels((lower + upper) / 2, shape, spacing_mm)
@@ -106,7 +106,7 @@ def build_field(mesh: trimesh.Trimesh, spacing_mm: float, progress: Progress | N
             done += grid[i].size
             if progress is not None:
                 progress(done, values.size)
-        # Below 0 it is in a body that shares a wall with another one and is inside out against that one.
+        # A value below 0 is in a body that shares a wall with another one and is inside out relative to it.
         inside = winding_numbers(triangles, origin, spacing, grid.shape) != 0
         inside |= grid < hypot(*BESIDE) * spacing
         grid[inside] *= -1.0
@@ -114,7 +114,7 @@ def build_field(mesh: trimesh.Trimesh, spacing_mm: float, progress: Progress | N
 
 
 def _levels(middle: FloatArray, shape: IndexArray, spacing_mm: float) -> FloatArray:
-    """Return the levels of a field about `middle` `(3,)`, the finest one with `shape` `(3,)` points."""
+    """Return the levels of a field around `middle` `(3,)`, the finest one with `shape` `(3,)` points."""
     levels = []
     reach_mm = (shape - 1) * spacing_mm / 2 + _REACH_MM
     while True:
@@ -135,7 +135,7 @@ def _write_distances(
     nearest = 0
     for j in range(ny):
         for step in range(nz):
-            # To and fro, so that the triangle nearest to the last point is always near.
+            # In alternating direction, so that the triangle nearest to the previous point is always near.
             k = step if j % 2 == 0 else nz - 1 - step
             x, y, z = origin[0] + i * spacing, origin[1] + j * spacing, origin[2] + k * spacing
             distance2, nearest = nearest_triangle(triangles, boxes, x, y, z, nearest)
@@ -148,7 +148,7 @@ def cached_field(
     progress: Progress | None = None,
     folder: Path | None = None,
 ) -> SignedDistanceField:
-    """Return the field of `mesh`, read from `folder` if it was built before (default: the user's cache)."""
+    """Return the field of `mesh`, read from `folder` if it was stored before (default: the user's cache)."""
     file = (folder or _cache_folder()) / f"{_digest(mesh, spacing_mm)}{FIELD}"
     stored = _load(file)
     if stored is not None:
@@ -172,7 +172,7 @@ def _digest(mesh: trimesh.Trimesh, spacing_mm: float) -> str:
 
 
 def _load(file: Path) -> SignedDistanceField | None:
-    """Return the stored field, or None where there is none that can be trusted: it is then built anew."""
+    """Return the stored field, or None if there is none that can be trusted: then it is computed again."""
     content = load_file(file)
     if content is None:
         return None
@@ -187,19 +187,19 @@ def _load(file: Path) -> SignedDistanceField | None:
 def look_up(values: NDArray[np.float32], levels: FloatArray, x: float, y: float, z: float) -> float:
     """Return a lower bound in mm of the signed distance at a point of the mesh's frame.
 
-    With the weights w of trilinear interpolation in the finest grid that holds the point, e2 is the weighted mean of
-    the squared distances from the cell's corners, at most 3/4 of a squared spacing. The interpolated distance d is at
-    most e off. Far from the mesh the bound is better: the squared distance from any set, less the squared length of the
-    point's vector, is concave, since it is a minimum of linear functions. So the true distance is at least
-    sqrt(d2 - e2). Beyond all grids, the way to the mesh is the longest side of a triangle with a blunt angle at the
-    nearest point of the coarsest grid's box.
+    Let w be the weights of trilinear interpolation in the finest grid that contains the point. Then e2 is the weighted
+    mean of the squared distances from the cell's corners, at most 3/4 of a squared spacing. The error of the
+    interpolated distance d is at most e. Far from the mesh the bound is better. The squared distance from any set,
+    minus the squared length of the point's vector, is a minimum of linear functions and therefore concave. So the true
+    distance is at least sqrt(d2 - e2). Beyond all grids, consider the nearest point of the coarsest grid's box. The
+    distance to the mesh is the longest side of a triangle with an obtuse angle at that point.
 
     Args:
-        values: See `SignedDistanceField`.
-        levels: The same.
-        x: The point.
-        y: The point.
-        z: The point.
+        values: see `SignedDistanceField`.
+        levels: see `SignedDistanceField`.
+        x: x of the point.
+        y: y of the point.
+        z: z of the point.
     """
     first, last = 0, len(levels) - 1
     for level in range(last + 1):
@@ -231,7 +231,7 @@ def look_up(values: NDArray[np.float32], levels: FloatArray, x: float, y: float,
     beyond2 = dx * dx + dy * dy + dz * dz
     if beyond2 > 0.0:
         bound = sqrt(beyond2 + max(bound, 0.0) ** 2)
-    # The finest grid reaches a cell beyond the mesh, so the box that it leaves within holds the mesh.
+    # The finest grid extends one cell beyond the mesh, so the box without its outermost cells contains the mesh.
     outside2 = _outside2(levels, x, y, z)
     return max(bound, sqrt(outside2)) if outside2 > 0.0 else bound
 
@@ -251,12 +251,12 @@ def field_distance(
     values: NDArray[np.float32], levels: FloatArray,
     ax: float, ay: float, az: float, bx: float, by: float, bz: float, enough_mm: float,
 ) -> float:  # fmt: skip
-    """Return a lower bound in mm of the least signed distance of the segment a-b from the mesh.
+    """Return a lower bound in mm of the minimum signed distance of the segment a-b from the mesh.
 
-    It is never above the true distance and, where the segment runs within the finest grid, at most two spacings below.
-    Where the distance is `enough_mm` or more, the result is only known to be at least that. The walk goes from the
-    middle towards each end and strides as far as the distance at hand allows: nothing nearer than the least one found
-    can lie within the difference of the two, nor within that of the end.
+    The bound is never above the true distance. If the segment is inside the finest grid, it is at most two spacings
+    below. For a distance of `enough_mm` or more, the result is only known to be at least that. The walk goes from the
+    middle to each end, in steps as large as the present distance allows: within the difference of the present and the
+    minimum distance, there is no smaller distance, nor within that of the end.
     """
     ux, uy, uz = bx - ax, by - ay, bz - az
     length = sqrt(ux * ux + uy * uy + uz * uz)
@@ -270,11 +270,12 @@ def field_distance(
         last = look_up(values, levels, ax + t * ux, ay + t * uy, az + t * uz)
         least = min(least, last)
         along, value = 0.0, middle
-        # The brackets matter: no less than `half` once `along` is, so that rounding cannot keep the walk from ending.
+        # The brackets are necessary: the result is at least `half` once `along` is, so that rounding cannot make the
+        # walk endless.
         while along + ((value - least) + (last - least)) < half:
             along = min(along + max(value - least, shortest), half)
             t = 0.5 + end * (along / half)
             value = look_up(values, levels, ax + t * ux, ay + t * uy, az + t * uz)
             least = min(least, value)
-    # `free - error` need not be `enough_mm`: in floating point it may be less, and would block a free segment.
+    # `free - error` need not be `enough_mm`: in floating point it may be smaller, and would block a clear segment.
     return least - error if least < free else enough_mm

@@ -1,8 +1,8 @@
 """Distance between a line segment and a convex solid: a box, a cylinder, or a capsule (a sphere is a short one).
 
-The signed distance to a convex solid (negative inside) is a convex function along a segment, so each tangent bounds it
-from below and the lowest point is closed in on by letting tangents meet. Solids are centered on their own frame,
-their axis along z. Kernels take coordinates one by one, in millimeters, and allocate nothing.
+The signed distance to a convex solid (negative inside) is a convex function along a segment. So each tangent is a lower
+bound, and the intersections of tangents converge to the minimum. Solids are centered on their own frame, with their
+axis along z. Kernels take coordinates as single numbers, in millimeters, and allocate nothing.
 """
 
 from math import sqrt
@@ -11,11 +11,11 @@ from planner.geometry.capsule import segment_distance
 from planner.kernel import kernel
 
 BOX = 0
-"""Size: half the length in x, y and z."""
+"""Size: half of the length in x, y and z."""
 CYLINDER = 1
-"""Size: the radius, half the height, unused."""
+"""Size: the radius, half of the height, unused."""
 CAPSULE = 2
-"""Size: the radius, half the length of the segment, unused."""
+"""Size: the radius, half of the length of the segment, unused."""
 
 _TOLERANCE_MM = 1e-7
 _MOST_TANGENTS = 64
@@ -25,7 +25,7 @@ _MOST_TANGENTS = 64
 def box_distance(
     x: float, y: float, z: float, half_x: float, half_y: float, half_z: float
 ) -> tuple[float, float, float, float]:
-    """Return the signed distance in mm of a point from a box, and that distance's gradient."""
+    """Return the signed distance in mm of a point from a box, and the gradient of the distance."""
     qx, qy, qz = abs(x) - half_x, abs(y) - half_y, abs(z) - half_z
     sign_x = 1.0 if x >= 0.0 else -1.0
     sign_y = 1.0 if y >= 0.0 else -1.0
@@ -46,7 +46,7 @@ def box_distance(
 def cylinder_distance(
     x: float, y: float, z: float, radius: float, half_height: float
 ) -> tuple[float, float, float, float]:
-    """Return the signed distance in mm of a point from a cylinder with flat ends, and that distance's gradient."""
+    """Return the signed distance in mm of a point from a cylinder with flat ends, and the gradient of the distance."""
     from_axis = sqrt(x * x + y * y)
     out_x, out_y = (x / from_axis, y / from_axis) if from_axis > 0.0 else (1.0, 0.0)
     sign_z = 1.0 if z >= 0.0 else -1.0
@@ -64,7 +64,7 @@ def cylinder_distance(
 def capsule_distance(
     x: float, y: float, z: float, radius: float, half_length: float
 ) -> tuple[float, float, float, float]:
-    """Return the signed distance in mm of a point from a capsule, and that distance's gradient."""
+    """Return the signed distance in mm of a point from a capsule, and the gradient of the distance."""
     z -= min(max(z, -half_length), half_length)
     distance = sqrt(x * x + y * y + z * z)
     if distance == 0.0:
@@ -76,7 +76,7 @@ def capsule_distance(
 def point_distance(
     kind: int, size_0: float, size_1: float, size_2: float, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
-    """Return the signed distance in mm of a point from a solid, and that distance's gradient."""
+    """Return the signed distance in mm of a point from a solid, and the gradient of the distance."""
     if kind == BOX:
         return box_distance(x, y, z, size_0, size_1, size_2)
     if kind == CAPSULE:
@@ -89,9 +89,9 @@ def solid_distance(
     kind: int, size_0: float, size_1: float, size_2: float,
     ax: float, ay: float, az: float, bx: float, by: float, bz: float, enough_mm: float,
 ) -> float:  # fmt: skip
-    """Return the least signed distance in mm of the segment a-b from a solid.
+    """Return the minimum signed distance in mm of the segment a-b from a solid.
 
-    The result is exact where it is below `enough_mm`; a distance at or above that is only known to be so.
+    The result is exact if it is below `enough_mm`; a value at or above that is only known to be sufficient.
     """
     if kind == CAPSULE:
         return segment_distance(ax, ay, az, bx, by, bz, 0.0, 0.0, -size_1, 0.0, 0.0, size_1) - size_0

@@ -1,14 +1,14 @@
 """Rigid transformations as arrays of homogeneous matrices `(n, 4, 4)`, lengths in mm.
 
 The robot's language writes an orientation as yaw, pitch and roll in the ZYZ' convention: Rz(yaw) Ry(pitch) Rz(roll).
-Here that is an input and output format only.
+Here this is only an input and output format.
 """
 
 import numpy as np
 
 from planner.arrays import FloatArray
 
-# What a pose written with four decimals can still keep.
+# Precision of a pose that is written with four decimals.
 _RIGIDITY_TOLERANCE = 1e-3
 
 
@@ -49,7 +49,7 @@ def rigid_inverse(T: FloatArray) -> FloatArray:
 
 
 def first_not_rigid(T: FloatArray) -> tuple[int, str] | None:
-    """Return the index of the first of `(n, 4, 4)` that is no rigid transformation and why, or None."""
+    """Return the index of the first of `(n, 4, 4)` that is not a rigid transformation, and why, or None."""
     for i, pose in enumerate(T):
         R = pose[:3, :3]
         if not np.isfinite(pose).all():
@@ -64,7 +64,7 @@ def first_not_rigid(T: FloatArray) -> tuple[int, str] | None:
 
 
 def nearest_rigid(T: FloatArray) -> FloatArray:
-    """Return `(n, 4, 4)` with each rotation replaced by the nearest one, which takes out the rounding of a file."""
+    """Return `(n, 4, 4)` with each rotation replaced by the nearest exact one, which removes the rounding of a file."""
     U, _, Vt = np.linalg.svd(T[:, :3, :3])
     rigid = np.tile(np.eye(4), (len(T), 1, 1))
     rigid[:, :3, :3] = U @ Vt

@@ -1,4 +1,4 @@
-"""The winding number of a closed surface about each point of a grid: whether the point is inside."""
+"""The winding number of a closed surface around each point of a grid: whether the point is inside."""
 
 from math import ceil, floor, sqrt
 
@@ -9,25 +9,25 @@ from planner.arrays import FloatArray
 from planner.kernel import kernel
 
 BESIDE = 1e-3 / sqrt(2.0), 1e-3 / sqrt(3.0)
-"""How far, in grid spacings along x and y, a line that is followed through the surface runs beside the grid's own.
+"""Offset in grid spacings along x and y of the line through the surface from the line of the grid.
 
-Parts made of round numbers have walls and edges exactly on the grid's lines, where rounding would decide what is in.
+Parts with round dimensions have walls and edges exactly on the lines of the grid, where rounding would decide.
 """
 
 
 def winding_numbers(
     triangles: FloatArray, origin: FloatArray, spacing_mm: float, shape: tuple[int, ...]
 ) -> NDArray[np.int32]:
-    """Return how often the surface is wound around each point of the grid: above 0 inside, 0 outside.
+    """Return the winding number of the surface around each point of the grid: above 0 inside, 0 outside.
 
-    It is the number of faces above the point that look up, less those that look down. The line followed upwards runs
-    beside the point by `BESIDE`, so the number can only be wrong where the distance is less than that.
+    It is the number of faces above the point that face up, minus the number that face down. The vertical line is offset
+    from the point by `BESIDE`, so the number can only be wrong where the distance to the surface is smaller.
 
     Args:
         triangles: `(n, 3, 3)`, the corners of a closed surface in mm, counterclockwise seen from outside.
         origin: `(3,)`, the grid's first point.
-        spacing_mm: The grid's spacing.
-        shape: The grid's points along x, y and z.
+        spacing_mm: spacing of the grid.
+        shape: number of points of the grid along x, y and z.
     """
     crossings = np.zeros(shape, dtype=np.int32)
     corners = (triangles - origin) / spacing_mm - (*BESIDE, 0.0)
@@ -40,9 +40,9 @@ def winding_numbers(
 def _count_crossings(triangles: FloatArray, crossings: NDArray[np.int32]) -> None:
     """Add each crossing of a vertical grid line with a triangle to the highest grid point below it.
 
-    Corners `(n, 3, 3)` are in grid spacings from the grid's first point. What a line's side of an edge is comes out
-    with the opposite sign, bit for bit, for the neighbor that has the edge the other way round, so a line through a
-    closed surface slips through no edge.
+    Corners `(n, 3, 3)` are in grid spacings from the grid's first point. The side of a line relative to an edge has the
+    exactly opposite sign for the neighbor, which has the edge in the opposite direction. So a line through a closed
+    surface passes between no two triangles.
     """
     nx, ny, nz = crossings.shape
     for t in range(len(triangles)):
@@ -67,9 +67,9 @@ def _count_crossings(triangles: FloatArray, crossings: NDArray[np.int32]) -> Non
 
 
 def solid_angles(triangles: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the solid angle `(m,)` in steradian that a surface fills, seen from points `(m, 3)`.
+    """Return the solid angle `(m,)` in steradian of a surface, seen from points `(m, 3)`.
 
-    Seen from inside a closed surface it is 4 pi, from outside 0 (van Oosterom and Strackee, 1983).
+    Inside of a closed surface it is 4 pi, outside 0 (van Oosterom and Strackee, 1983).
 
     Args:
         triangles: `(n, 3, 3)`, counterclockwise seen from outside.

@@ -1,1 +1,1 @@
-"""The arm: its configurations, its inverse kinematics, and what a posture of it is worth (Eq. 1 and 2)."""
+"""The arm: its configurations, its inverse kinematics, and the rating of its postures (Eq. 1 and 2)."""

@@ -2,8 +2,8 @@
 
 Standard convention (Spong et al., 2005): frame i follows frame i - 1 by Rz(theta i) Tz(d) Tx(a) Rx(alpha).
 
-Makers count joint angles from another zero, and some joints the other way round: theta = sign x angle + offset. All
-computing is done in theta, in radians. The robot's own angles, in degrees, are what files hold.
+Manufacturers count joint angles from another zero, and some joints in the opposite direction: theta = sign x angle +
+offset. All computations use theta, in radians. Files contain the robot's own angles, in degrees.
 """
 
 import math
@@ -21,12 +21,12 @@ _SHIPPED = Path(__file__).parents[1] / "arms"
 _ORTHO_PARALLEL_ALPHA_DEG = (-90.0, 0.0, 90.0, -90.0, 90.0, 0.0)
 
 
-# The columns of the table that the compiled kernels read, one row per joint.
+# The columns of the table for the compiled kernels, one row per joint.
 D_MM, A_MM, COS_ALPHA, SIN_ALPHA, LOWER_RAD, UPPER_RAD = range(6)
 
 
 def shipped_arms() -> list[str]:
-    """Return the names of the arms that come with the planner."""
+    """Return the names of the shipped arms."""
     return sorted(file.stem for file in _SHIPPED.glob("*.toml"))
 
 
@@ -35,19 +35,19 @@ class Arm:
     """A Denavit-Hartenberg table with joint limits and speeds, one entry per joint.
 
     Attributes:
-        name: The maker's name of the arm.
-        d_mm: Offsets along the joint axes.
-        a_mm: Lengths of the common normals.
-        alpha_deg: Twists about the common normals.
-        lower_deg: Lower joint limits, in the robot's own angles.
-        upper_deg: Upper joint limits, in the robot's own angles.
-        max_speed_deg_s: Maximum joint speeds.
-        sign: 1, or -1 for a joint that the robot counts the other way round than the table.
-        offset_deg: The table's angle where the robot's own is 0.
+        name: the manufacturer's name of the arm.
+        d_mm: offsets along the joint axes.
+        a_mm: lengths of the common normals.
+        alpha_deg: twists around the common normals.
+        lower_deg: lower joint limits, in the robot's own angles.
+        upper_deg: upper joint limits, in the robot's own angles.
+        max_speed_deg_s: maximum joint speeds.
+        sign: 1, or -1 for a joint that the robot counts in the opposite direction.
+        offset_deg: angle in the table when the robot's own angle is 0.
 
     Raises:
-        ArmTableError: The arm is not ortho-parallel with a spherical wrist, which the closed-form inverse kinematics
-            need, or its limits contradict each other, or a sign is neither 1 nor -1.
+        ArmTableError: the arm is not ortho-parallel with a spherical wrist, its limits are inconsistent, or a sign is
+            not 1 or -1. The closed-form inverse kinematics need such an arm.
     """
 
     name: str
@@ -98,8 +98,8 @@ class Arm:
         """Return the arm of a TOML file, or a shipped arm by its name.
 
         Raises:
-            ScanFileError: The file cannot be read, or a key is missing, unknown or of the wrong type.
-            ArmTableError: See the class.
+            ScanFileError: the file cannot be read, or a key is missing, unknown or of the wrong type.
+            ArmTableError: see the class.
         """
         shipped = _SHIPPED / f"{file}.toml"
         top = TomlTable.load(shipped if shipped.is_file() else Path(file), ScanFileError)
@@ -133,7 +133,7 @@ class Arm:
     @property
     def table(self) -> FloatArray:
         """The `(6, 6)` table as the kernels take it: one row per joint, the columns named D_MM to UPPER_RAD."""
-        # The twists are multiples of 90 degrees, whose sines and cosines are whole numbers.
+        # The twists are multiples of 90 degrees, with integer sines and cosines.
         alpha = np.radians(self.alpha_deg)
         return np.column_stack((self.d_mm, self.a_mm, np.rint(np.cos(alpha)), np.rint(np.sin(alpha)), *self.limits))
 
@@ -151,10 +151,10 @@ class Arm:
 
 @kernel
 def link_frames(arm: FloatArray, joints: FloatArray, frames: FloatArray) -> None:
-    """Write the base frame and the frame after each joint into `frames`, for an arm's table and joints `(6,)`.
+    """Write the base frame and the frame after each joint to `frames`, for an arm's table and joints `(6,)`.
 
-    Only the upper three rows are written, so `frames` may be `(7, 3, 4)` as well as `(7, 4, 4)`. The last is the
-    flange's. Fewer frames are those of the first joints.
+    Only the upper three rows are written, so `frames` may be `(7, 3, 4)` or `(7, 4, 4)`. The last frame is the flange.
+    Fewer frames are those of the first joints.
     """
     for row in range(3):
         for column in range(4):

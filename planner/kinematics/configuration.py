@@ -1,4 +1,4 @@
-"""The eight configurations in which the arm can hold one pose."""
+"""The eight configurations of the arm for one pose."""
 
 import re
 from enum import IntEnum
@@ -7,7 +7,7 @@ from planner.errors import ConfigurationNameError
 
 
 class Configuration(IntEnum):
-    """An arm configuration; its value is its slot in every array of solutions: 4 RIGHTY + 2 BELOW + NOFLIP."""
+    """An arm configuration. Its value is its slot in every array of solutions: 4 RIGHTY + 2 BELOW + NOFLIP."""
 
     LEFTY_ABOVE_FLIP = 0
     LEFTY_ABOVE_NOFLIP = 1
@@ -20,7 +20,7 @@ class Configuration(IntEnum):
 
     @property
     def label(self) -> str:
-        """The name as people write it: `LEFTY-ABOVE-NOFLIP`."""
+        """The name in text form: `LEFTY-ABOVE-NOFLIP`."""
         return self.name.replace("_", "-")
 
     @property
@@ -40,16 +40,16 @@ class Configuration(IntEnum):
 
     @classmethod
     def parse(cls, text: str) -> "Configuration":
-        """Return the configuration named by three words in any case, parted by dashes, spaces or commas.
+        """Return the configuration named by three words in any case, separated by dashes, spaces or commas.
 
         Raises:
-            ConfigurationNameError: The text names none.
+            ConfigurationNameError: the text does not name a configuration.
         """
         name = "_".join(re.split(r"[-_,\s]+", text.strip().upper()))
         try:
             return cls[name]
         except KeyError:
             raise ConfigurationNameError(
-                f"{text!r} is no arm configuration; write LEFTY or RIGHTY, ABOVE or BELOW, FLIP or NOFLIP,"
+                f"{text!r} is not an arm configuration; use LEFTY or RIGHTY, ABOVE or BELOW, FLIP or NOFLIP,"
                 " for example LEFTY-ABOVE-NOFLIP"
             ) from None

@@ -1,10 +1,12 @@
 """Closed-form inverse kinematics of an ortho-parallel arm with a spherical wrist: all eight configurations.
 
-The wrist center fixes joints 1 to 3, the flange's orientation then fixes joints 4 to 6. Two choices of joint 1
-(LEFTY faces the wrist, RIGHTY turns its back to it), two of the elbow and two of the wrist give the eight solutions.
+The wrist center determines joints 1 to 3; then the orientation of the flange determines joints 4 to 6. There are two
+choices for joint 1 (LEFTY faces the wrist, RIGHTY has its back to it), two for the elbow and two for the wrist.
+Together they give the eight solutions.
 
-For speed, what configurations share is computed once, sines and cosines come from the triangle's sides rather than its
-angles, and `inverse` is one long function: a call passes every array anew, which costs a fifth.
+For speed, common values of the configurations are computed once. Sines and cosines are computed from the sides of the
+triangle instead of its angles. `inverse` is one long function, because each call passes every array again, which costs
+a fifth of the time.
 """
 
 import math
@@ -23,7 +25,7 @@ _JOINT_1_LIMIT = int(Reason.JOINT_1_LIMIT)
 
 _TURN = 2.0 * math.pi
 _TURNS_PER_RAD = 1.0 / _TURN
-# Below these, rounding alone decides the angle of the joint that is undefined in the singularity itself.
+# Below these values, only rounding determines the angle of the joint that is undefined in the singularity.
 _SINGULAR_SINE = 1e-9
 _SINGULAR_DISTANCE2_MM2 = 1e-18
 
@@ -31,9 +33,9 @@ _SINGULAR_DISTANCE2_MM2 = 1e-18
 def inverse_kinematics(arm: Arm, T_BF: FloatArray) -> tuple[FloatArray, CodeArray]:
     """Return the joints `(n, 8, 6)` in radians and the reasons `(n, 8)` for flange poses `(n, 4, 4)` in mm.
 
-    The second axis is the slot of the `Configuration`. Each joint is on the turn nearest the middle of its range, so
-    a limit that it passes there, it passes on every turn. Out of reach, the joints are NaN; beyond a limit they are
-    given all the same. In a singularity the free joint (1 or 4) is put at the middle of its range, the others
+    The second axis is the slot of the `Configuration`. Each joint is on the turn nearest the middle of its range. So if
+    it exceeds a limit there, it exceeds it on every turn. Out of reach, the joints are NaN; beyond a limit they are
+    returned nevertheless. In a singularity, the free joint (1 or 4) is set to the middle of its range, the others
     complete the pose, and the reason is SINGULAR: that solution is one of infinitely many.
     """
     poses = np.ascontiguousarray(T_BF, dtype=np.float64)
@@ -75,10 +77,10 @@ def _solve_wrist(
     joints: FloatArray,
     slot: int,
 ) -> bool:
-    """Write joints 4 to 6 of FLIP into `slot` and of NOFLIP into `slot + 1`; return whether axes 4 and 6 coincide.
+    """Write joints 4 to 6 of FLIP to `slot` and of NOFLIP to `slot + 1`; return whether axes 4 and 6 coincide.
 
-    Base and forearm differ by Rz(joint 1) Ry(joints 2 + 3); within the forearm's frame the wrist turns the flange
-    by R = Rz(joint 4) Ry(joint 5) Rz(joint 6).
+    Base and forearm differ by Rz(joint 1) Ry(joints 2 + 3). In the forearm's frame, the wrist rotates the flange by R =
+    Rz(joint 4) Ry(joint 5) Rz(joint 6).
     """
     u0 = c1 * T_BF[0, 0] + s1 * T_BF[1, 0]
     u1 = c1 * T_BF[0, 1] + s1 * T_BF[1, 1]
@@ -98,7 +100,7 @@ def _solve_wrist(
         c4, s4 = sense * r02 / sine, sense * r12 / sine
         joint_4 = math.atan2(s4, c4)
     joint_5 = math.atan2(sine, r22)
-    # From Rz(-joint 4) R, which holds for any joint 4, so it completes the pose in the singularity too.
+    # From Rz(-joint 4) R, which is valid for any joint 4, so it completes the pose in the singularity too.
     joint_6 = math.atan2(c4 * r10 - s4 * r00, c4 * r11 - s4 * r01)
     joints[slot, 3] = _nearest_turn(arm, 3, joint_4 + math.pi)
     joints[slot, 4] = _nearest_turn(arm, 4, -joint_5)
@@ -122,16 +124,16 @@ def inverse(arm: FloatArray, T_BF: FloatArray, joints: FloatArray, reasons: Code
     """Write the eight solutions of one pose; see `inverse_kinematics`.
 
     Args:
-        arm: The arm's table, `(6, 6)`.
-        T_BF: Flange pose `(4, 4)` or `(3, 4)`, in mm.
-        joints: Written: `(8, 6)`, radians.
-        reasons: Written: `(8,)`.
+        arm: table of the arm, `(6, 6)`.
+        T_BF: flange pose `(4, 4)` or `(3, 4)`, in mm.
+        joints: output `(8, 6)`, radians.
+        reasons: output `(8,)`.
     """
     d1, d4, d6 = arm[0, D_MM], arm[3, D_MM], arm[5, D_MM]
     a1, a2, a3 = arm[0, A_MM], arm[1, A_MM], arm[2, A_MM]
-    # With all twists negated, joints 2, 3 and 5 turn the other way round and nothing else changes.
+    # With all twists negated, joints 2, 3 and 5 have the opposite direction, and nothing else changes.
     sense = -arm[0, SIN_ALPHA]
-    # The wrist center lies in the plane that joint 1 turns, which passes axis 1 at the distance `lateral`.
+    # The wrist center is in the plane that joint 1 turns, which passes axis 1 at the distance `lateral`.
     x = T_BF[0, 3] - d6 * T_BF[0, 2]
     y = T_BF[1, 3] - d6 * T_BF[1, 2]
     drop = d1 - (T_BF[2, 3] - d6 * T_BF[2, 2])
@@ -151,7 +153,7 @@ def inverse(arm: FloatArray, T_BF: FloatArray, joints: FloatArray, reasons: Code
         facing = azimuth - shoulder if side == 0 else azimuth + shoulder + math.pi
         joint_1 = _middle(arm, 0) if on_axis_1 else _nearest_turn(arm, 0, facing)
         c1, s1 = math.cos(joint_1), math.sin(joint_1)
-        # The triangle of upper arm, forearm and the span from joint 2 to the wrist center, `ahead` of it and below.
+        # The triangle of upper arm, forearm and the distance from joint 2 to the wrist center, `ahead` of it and below.
         ahead = (in_plane if side == 0 else -in_plane) - a1
         span2 = ahead * ahead + drop * drop
         cos_elbow = (span2 - a2 * a2 - forearm2) / (2.0 * a2 * forearm)

@@ -1,4 +1,4 @@
-"""Tell an arm's configuration from its joints."""
+"""Determine an arm's configuration from its joints."""
 
 import math
 
@@ -9,12 +9,12 @@ from planner.kinematics.arm import Arm
 
 
 def configurations(arm: Arm, joints: FloatArray) -> IndexArray:
-    """Return the slot `(n,)` of the configuration that each row of joints `(n, 6)`, in radians, is in.
+    """Return the slot `(n,)` of the configuration of each row of joints `(n, 6)`, in radians.
 
-    LEFTY when the wrist center lies ahead of axis 1; ABOVE when the elbow bends down from the stretched arm (up, for
-    RIGHTY); FLIP when joint 5 is negative. On a boundary, where two configurations meet, LEFTY and NOFLIP win.
+    LEFTY: the wrist center is ahead of axis 1. ABOVE: the elbow bends down from the stretched arm (up for RIGHTY).
+    FLIP: joint 5 is negative. At a boundary between two configurations, LEFTY and NOFLIP are returned.
     """
-    # Mirrored twists turn joints 2 and 3 the other way round.
+    # Mirrored twists reverse the direction of joints 2 and 3.
     sense = -math.copysign(1.0, arm.alpha_deg[0])
     upper, forearm = sense * joints[:, 1], sense * (joints[:, 1] + joints[:, 2])
     reach_mm = arm.a_mm[0] + arm.a_mm[1] * np.cos(upper) + arm.a_mm[2] * np.cos(forearm) + arm.d_mm[3] * np.sin(forearm)

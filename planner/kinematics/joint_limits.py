@@ -1,4 +1,4 @@
-"""Joint limits and joint speeds along a path of joints, whoever computed it."""
+"""Check joint limits and joint speeds along a joint path from any source."""
 
 from collections.abc import Collection
 from enum import Enum
@@ -9,29 +9,29 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.kinematics.arm import Arm
 
-# Files carry nine decimals: this much above a limit is rounding.
+# Files have nine decimals: an excess of this size over a limit is rounding.
 _ROUNDING_DEG = 1e-6
 _HALF_TURN_DEG = 180.0
 
 
 class FaultKind(Enum):
-    """What is wrong with a joint: its text takes the value and the limit."""
+    """The kind of a fault of a joint: its text takes the value and the limit."""
 
     UNKNOWN = "has no angle"
     LIMIT = "is at {value:.1f} deg, beyond its limit of {limit:g} deg"
-    TURN = "moves by {value:.1f} deg from the location before, more than half a turn"
-    SPEED = "moves at {value:.1f} deg/s from the location before, faster than its limit of {limit:g} deg/s"
+    TURN = "moves by {value:.1f} deg from the previous location, more than half a turn"
+    SPEED = "moves at {value:.1f} deg/s from the previous location, faster than its limit of {limit:g} deg/s"
 
 
 class JointFault(NamedTuple):
     """The first violation along a path.
 
     Attributes:
-        location: where, counted from 0; for a speed, the location at which the step ends.
-        joint: counted from 1.
-        kind: what is wrong.
-        value: the angle in deg, the way in deg or the speed in deg/s, signed.
-        limit: what `value` may be at most, or at least for a lower joint limit.
+        location: index of the location, from 0; for a speed, the location at the end of the step.
+        joint: number of the joint, from 1.
+        kind: kind of the fault.
+        value: the angle in deg, the travel in deg or the speed in deg/s, signed.
+        limit: maximum of `value`, or its minimum for a lower joint limit.
     """
 
     location: int
@@ -50,15 +50,15 @@ def first_joint_fault(
 ) -> JointFault | None:
     """Return the first violation of the arm's joint limits or speeds along a path, or None.
 
-    The turns of the joints count: joint 6 at 370 degrees is not at 10. A step is one motion by the shorter way, so it
-    moves no joint by more than half a turn. Of several violations at a location the order is that of `FaultKind`, then
-    from the base to the flange.
+    The turns of the joints count: joint 6 at 370 degrees is not at 10. A step is one motion in the shorter direction,
+    so it moves no joint by more than half a turn. Several violations at a location are in the order of `FaultKind`,
+    then from the base to the flange.
 
     Args:
         arm: limits and speeds.
         joints_deg: (n + 1, 6) at the scan locations.
         step_s: time from one location to the next.
-        paused_steps: steps in which the probe retracts and the arm has all the time that it needs.
+        paused_steps: steps in which the probe retracts and the arm has sufficient time.
     """
     lower_deg, upper_deg = np.array(arm.lower_deg), np.array(arm.upper_deg)
     ways_deg = np.diff(joints_deg, axis=0, prepend=joints_deg[:1])

@@ -13,12 +13,12 @@ _TURN = 2.0 * np.pi
 
 
 class JointPath(NamedTuple):
-    """The joints along a path, or why the arm cannot follow it.
+    """The joints along a path, or the reason why the arm cannot follow it.
 
     Attributes:
         joints: `(n, 6)` in radians; rows out of reach are NaN.
-        reason: REACHED when the arm can follow the path, else why it cannot.
-        step: The first step at which it cannot, counted from 0.
+        reason: REACHED if the arm can follow the path, else the reason why it cannot.
+        step: the first step at which it cannot, from 0.
     """
 
     joints: FloatArray
@@ -29,19 +29,19 @@ class JointPath(NamedTuple):
 def joint_path(
     arm: Arm, joints: FloatArray, reasons: CodeArray, step_s: float, before: FloatArray | None = None
 ) -> JointPath:
-    """Return the joints on continuous turns, within the limits of the arm where possible.
+    """Return the joints on continuous turns, within the limits of the arm if possible.
 
-    Each step takes the turn nearest the one before; between two steps the joints move in proportion. The turn at the
-    start is free (joints 4 and 6 have more than one). Of the turns that keep the whole path within a joint's limits,
-    the one is taken that brings the path nearest the middle of its range, or nearest `before`. Where no turn does, the
-    one that follows the path farthest.
+    Each step uses the turn nearest to the previous one; between two steps the joints move proportionally. The turn at
+    the start is free (joints 4 and 6 have several). Several turns may keep the whole path within the limits of a joint.
+    Then the path nearest to the middle of its range is used, or nearest to `before`. If there is none, the one that
+    follows the path farthest is used.
 
     Args:
-        arm: Joint limits and speeds.
+        arm: joint limits and speeds.
         joints: `(n, 6)` in radians, on any turn; one row every `step_s`.
         reasons: `(n,)` of the inverse kinematics.
-        step_s: Time from one row to the next.
-        before: `(6,)` in radians, the joints before the path begins.
+        step_s: time from one row to the next.
+        before: `(6,)` in radians, the joints before the start of the path.
     """
     unsolved = np.flatnonzero(np.isin(reasons, (Reason.OUT_OF_REACH, Reason.SINGULAR)))
     if len(unsolved):
@@ -64,21 +64,21 @@ def joint_path(
 
 
 def joint_speeds_deg_s(joints: FloatArray, step_s: float) -> FloatArray:
-    """Return the speeds `(n, 6)` at which joints `(n, 6)`, in radians, are reached; 0 in the first row."""
+    """Return the speeds `(n, 6)` of the steps to each row of joints `(n, 6)`, in radians; 0 in the first row."""
     return np.asarray(np.degrees(np.abs(np.diff(joints, axis=0, prepend=joints[:1]))) / step_s)
 
 
 def _flange_spins(joints: FloatArray) -> BoolArray:
-    """Return whether the flange goes the longer way round to each row (n,) of joints (n, 6)."""
+    """Return whether the flange takes the longer direction to each row (n,) of joints (n, 6)."""
     moves = np.diff(joints, axis=0)
     ways = zip(joints[:-1, 4].tolist(), joints[1:, 4].tolist(), moves[:, 3].tolist(), moves[:, 5].tolist(), strict=True)
     return np.array([False, *(turns_the_long_way(*way) for way in ways)])
 
 
 def _start_turns(joints: FloatArray, lower: FloatArray, upper: FloatArray, before: FloatArray | None) -> FloatArray:
-    """Return what to add to each joint, `(6,)`: whole turns, in radians."""
+    """Return the offset of each joint, `(6,)`: whole turns, in radians."""
     lowest, highest = np.minimum.accumulate(joints), np.maximum.accumulate(joints)
-    # For each beginning of the path, the turn that fits if any does.
+    # For each start of the path, the turn that fits, if any.
     central = -_TURN * np.rint((0.5 * (lowest + highest) - 0.5 * (lower + upper)) / _TURN)
     fits = (lowest + central >= lower) & (highest + central <= upper)
     last = np.where(fits[-1], len(joints), np.argmin(fits, axis=0)) - 1

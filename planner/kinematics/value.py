@@ -1,8 +1,8 @@
 """The value function f_R of a pose: a product of named factors, each from 0 (forbidden) to 1 (section 3 of the paper).
 
-    f_R = joint_1 x ... x joint_6  (Eq. (1) and (2))  x  wrist  x  clearance  x  the user's own factors
+    f_R = joint_1 x ... x joint_6  (Eq. (1) and (2))  x  wrist  x  clearance  x  user-defined factors
 
-Each factor can be switched off, weighted by its exponent (gamma is that of Eq. (1)), and looked at on its own.
+Each factor can be switched off, weighted by its exponent (gamma is that of Eq. (1)), and computed separately.
 """
 
 import math
@@ -33,18 +33,18 @@ _NUMBERS = (
     "comfortable_clearance_mm",
     "clearance_weight",
 )
-# The places in the array that the kernels take: the exponents in the order of FACTORS (0 switches a factor off, since
-# x**0 is 1), then the bounds.
+# The layout of the array for the kernels: the exponents in the order of FACTORS (0 switches a factor off, because x**0
+# is 1), then the bounds.
 WRIST_EXPONENT, CLEARANCE_EXPONENT = 6, 7
 WRIST_THRESHOLD_RAD, WRIST_COMFORTABLE_RAD, MINIMUM_CLEARANCE_MM, COMFORTABLE_CLEARANCE_MM = 8, 9, 10, 11
 
 
 class RatedPoses(NamedTuple):
-    """Poses without a fault, one row each, as a user's factor gets them.
+    """Poses without a fault, one row each, as passed to a user's factor.
 
     Attributes:
         joints: `(n, 6)`, the robot's own angles, in radians.
-        clearance_mm: `(n,)`; where nothing is nearer than the comfortable clearance, that.
+        clearance_mm: `(n,)`, limited to the comfortable clearance.
         locations: `(n,)`, index of the scan location.
         table_angles_deg: `(n,)`.
     """
@@ -56,17 +56,18 @@ class RatedPoses(NamedTuple):
 
 
 class UserFactor(NamedTuple):
-    """A factor of the user's own: a name, and a function that rates all poses of a block, `(n,)`, each in 0..1."""
+    """A user-defined factor: a name, and a function that rates all poses of a block, `(n,)`, each in 0..1."""
 
     name: str
     rate: Callable[[RatedPoses], FloatArray]
 
 
 def plug_in_factor(name: str) -> UserFactor:
-    """Return the factor of an installed package; what it returns is checked.
+    """Return the factor of an installed package; its results are checked.
 
     Raises:
-        PlugInError: There is none of that name, or it cannot be loaded; while maps are built, that it failed.
+        PlugInError: there is no factor with that name, or it cannot be loaded; during the computation of maps: it
+            failed.
     """
     rate = load_plug_in(FACTOR_GROUP, name)
     if not callable(rate):
@@ -89,22 +90,22 @@ def plug_in_factor(name: str) -> UserFactor:
 
 @dataclass(frozen=True)
 class ValueFunction:
-    """What f_R is made of.
+    """The configuration of f_R.
 
     Attributes:
-        factors: The names, out of `FACTORS`, of those that count. A hard limit holds without its factor too: a joint
+        factors: names of the active factors, from `FACTORS`. A hard limit is enforced without its factor too: a joint
             beyond its range has no solution to rate.
-        gamma: Exponents of Eq. (1), joint by joint.
+        gamma: exponents of Eq. (1), one per joint.
         wrist_threshold_deg: |J5| up to which the wrist is singular (factor 0).
-        wrist_comfortable_deg: |J5| from which on it is not near it (factor 1).
-        wrist_weight: The wrist factor's exponent.
-        minimum_clearance_mm: Clearance up to which bodies collide (factor 0).
-        comfortable_clearance_mm: Clearance from which on they are not near each other (factor 1).
-        clearance_weight: The clearance factor's exponent.
-        user_factors: Further factors.
+        wrist_comfortable_deg: |J5| from which on the wrist is far from the singularity (factor 1).
+        wrist_weight: exponent of the wrist factor.
+        minimum_clearance_mm: clearance up to which bodies collide (factor 0).
+        comfortable_clearance_mm: clearance from which on bodies are far from each other (factor 1).
+        clearance_weight: exponent of the clearance factor.
+        user_factors: additional factors.
 
     Raises:
-        ValueError: A factor that does not exist, an exponent below 0, or bounds in the wrong order.
+        ValueError: an unknown factor, an exponent below 0, or bounds in the wrong order.
     """
 
     factors: frozenset[str] = frozenset(FACTORS)
@@ -120,18 +121,18 @@ class ValueFunction:
     def __post_init__(self) -> None:
         unknown = sorted(self.factors - set(FACTORS))
         if unknown:
-            raise ValueError(f"{unknown[0]!r} is no factor of the value function; there are {', '.join(FACTORS)}")
+            raise ValueError(f"{unknown[0]!r} is not a factor of the value function; allowed are {', '.join(FACTORS)}")
         if len(self.gamma) != 6 or not all(0.0 <= exponent < math.inf for exponent in self.exponents):
-            raise ValueError(f"exponents are {self.exponents}; needed are 8 finite numbers at least 0")
+            raise ValueError(f"exponents are {self.exponents}; required are 8 finite numbers, at least 0")
         if not 0.0 <= self.wrist_threshold_deg < self.wrist_comfortable_deg < math.inf:
             raise ValueError(
                 f"the wrist is singular up to {self.wrist_threshold_deg:g} deg and comfortable from "
-                f"{self.wrist_comfortable_deg:g} deg; the first must be the smaller, and not negative"
+                f"{self.wrist_comfortable_deg:g} deg; the first must be smaller, and not negative"
             )
         if not 0.0 <= self.minimum_clearance_mm < self.comfortable_clearance_mm < math.inf:
             raise ValueError(
                 f"the clearance is too small up to {self.minimum_clearance_mm:g} mm and comfortable from "
-                f"{self.comfortable_clearance_mm:g} mm; the first must be the smaller, and not negative"
+                f"{self.comfortable_clearance_mm:g} mm; the first must be smaller, and not negative"
             )
 
     @property
@@ -141,16 +142,16 @@ class ValueFunction:
 
     @property
     def table(self) -> FloatArray:
-        """The value function as the kernels take it: `(12,)`, the places are named at the top of this file."""
+        """The value function for the kernels: `(12,)`; the indices are named at the top of this file."""
         on = (exponent * (name in self.factors) for name, exponent in zip(FACTORS, self.exponents, strict=True))
         wrist = math.radians(self.wrist_threshold_deg), math.radians(self.wrist_comfortable_deg)
         return np.array([*on, *wrist, self.minimum_clearance_mm, self.comfortable_clearance_mm])
 
     def only(self, names: Iterable[str]) -> "ValueFunction":
-        """Return the value function of the named factors alone, to look at what each contributes.
+        """Return the value function with only the named factors, to show the contribution of each.
 
         Raises:
-            ValueError: A name is neither in `FACTORS` nor that of a user's factor.
+            ValueError: a name is not in `FACTORS` and not a user-defined factor.
         """
         wanted = frozenset(names)
         chosen = tuple(factor for factor in self.user_factors if factor.name in wanted)
@@ -158,14 +159,14 @@ class ValueFunction:
 
     @classmethod
     def read(cls, table: TomlTable) -> "ValueFunction":
-        """Return the value function that a table of a scan file asks for; what is absent keeps its default.
+        """Return the value function for a table of a scan file; missing keys have their defaults.
 
         The keys are the attributes' names, and the factors' names with "on" or "off"; `user_factors` is a list of the
         names of installed plug-ins (`planner.plug_ins`).
 
         Raises:
-            ScanFileError: A key is unknown, or a value is not allowed.
-            PlugInError: A factor is not installed, or cannot be loaded.
+            ScanFileError: a key is unknown, or a value is not allowed.
+            PlugInError: a factor is not installed, or cannot be loaded.
         """
         default = cls()
         on = frozenset(name for name in FACTORS if table.choice(name, ("on", "off"), "on") == "on")
@@ -184,13 +185,14 @@ class ValueFunction:
 def joint_ranges(arm: Arm) -> FloatArray:
     """Return `(8, 6, 2)`: the lower and upper end in radians of each joint's range within each arm configuration.
 
-    A singularity lies inside the full range of joint 5 (axes 4 and 6 aligned at 0) and of joint 3 (arm stretched).
-    Eq. (1) over the full range would rate them highest. But no configuration reaches across: FLIP has the
-    negative half of joint 5's range and NOFLIP the positive one, and ABOVE and BELOW meet at the stretched arm.
+    There is a singularity inside the full range of joint 5 (axes 4 and 6 aligned at 0) and of joint 3 (arm stretched).
+    Eq. (1) over the full range would give it the highest value. But a configuration covers only one side: FLIP has the
+    negative half of joint 5's range and NOFLIP the positive one. ABOVE and BELOW have the stretched arm as their common
+    boundary.
     """
     ranges = np.empty((len(Configuration), 6, 2))
     ranges[:] = arm.limits.T
-    # Mirrored twists turn joint 3 the other way round (see `planner.kinematics.inverse_kinematics`).
+    # Mirrored twists reverse the direction of joint 3 (see `planner.kinematics.inverse_kinematics`).
     sense = -math.copysign(1.0, arm.alpha_deg[0])
     stretched = sense * math.atan2(arm.d_mm[3], arm.a_mm[2])
     for slot in Configuration:
@@ -201,7 +203,7 @@ def joint_ranges(arm: Arm) -> FloatArray:
 
 
 def _keep_half(limits: FloatArray, split: float, *, upper: bool) -> None:
-    """Cut a joint's range at `split`, unless that leaves nothing: then no solution is in this configuration."""
+    """Cut a joint's range at `split`. If nothing remains, keep it: then no solution has this configuration."""
     if limits[0] < split < limits[1]:
         limits[0 if upper else 1] = split
 
@@ -210,7 +212,7 @@ def _keep_half(limits: FloatArray, split: float, *, upper: bool) -> None:
 def joint_factor(angle: float, lower: float, upper: float, gamma: float) -> float:
     """Return f_j of Eq. (1): 1 in the middle of the joint's range, 0 at its ends and beyond.
 
-    The sine is taken from the nearer end, so that it is 0 at both (in floating point sin(pi) is not).
+    The sine is computed from the nearer end, so that it is 0 at both (in floating point sin(pi) is not).
     """
     from_end = max(min(angle - lower, upper - angle) / (upper - lower), 0.0)
     return float(math.sin(math.pi * from_end) ** gamma)
@@ -218,13 +220,13 @@ def joint_factor(angle: float, lower: float, upper: float, gamma: float) -> floa
 
 @kernel
 def joints_value(value: FloatArray, joints: FloatArray, ranges: FloatArray, slot: int) -> tuple[float, float, int]:
-    """Return f_R of Eq. (2), the product of the joint factors, with the least of them and its joint 0..5.
+    """Return f_R of Eq. (2), the product of the joint factors, with the smallest one and its joint 0..5.
 
     Args:
         value: `ValueFunction.table`.
         joints: `(8, 6)`, in radians.
         ranges: `(8, 6, 2)`, see `joint_ranges`.
-        slot: The arm configuration.
+        slot: the arm configuration.
     """
     product, least, worst = 1.0, 1.0, 0
     for j in range(6):
@@ -237,7 +239,7 @@ def joints_value(value: FloatArray, joints: FloatArray, ranges: FloatArray, slot
 
 @kernel
 def _rising_factor(value: float, zero_at: float, one_at: float, exponent: float) -> float:
-    """Return 0 up to `zero_at`, 1 from `one_at` on, a straight line between, all raised to `exponent`."""
+    """Return 0 up to `zero_at`, 1 from `one_at` on, linear in between, all raised to `exponent`."""
     rise = (value - zero_at) / (one_at - zero_at)
     return float(min(max(rise, 0.0), 1.0) ** exponent)
 

@@ -1,8 +1,8 @@
-"""Which way round a wrist turns the flange when its joints move from one solution to another, in proportion.
+"""The direction in which a wrist rotates the flange when its joints move proportionally between two solutions.
 
-Within the forearm's frame the wrist turns the flange by Rz(joint 4) Ry(joint 5) Rz(joint 6). Its unit quaternion holds
-half of each angle, so a whole turn of a joint changes its sign. The product of the quaternions before and after is thus
-positive where the flange goes the shorter way round, and negative where it goes the longer way.
+In the forearm's frame, the wrist rotates the flange by Rz(joint 4) Ry(joint 5) Rz(joint 6). Its unit quaternion
+contains half of each angle, so a whole turn of a joint changes its sign. The product of the quaternions before and
+after is positive if the flange takes the shorter direction. It is negative for the longer one.
 """
 
 import math
@@ -14,14 +14,14 @@ from planner.kernel import kernel
 def turns_the_long_way(before_5: float, after_5: float, move_4: float, move_6: float) -> bool:
     """Return whether the flange turns by more than half a turn.
 
-    Near the wrist singularity joints 4 and 6 swing against each other. Where each takes the nearest turn on its own,
-    both may swing the same way: the flange would spin once around.
+    Near the wrist singularity, joints 4 and 6 move in opposite directions. If each takes its nearest turn
+    independently, both may move in the same direction: then the flange would rotate by a full turn.
 
     Args:
-        before_5: Joint 5 before the move, in radians.
-        after_5: Joint 5 after it.
-        move_4: By how much joint 4 moves.
-        move_6: By how much joint 6 moves.
+        before_5: joint 5 before the move, in radians.
+        after_5: joint 5 after the move.
+        move_4: travel of joint 4.
+        move_6: travel of joint 6.
     """
     along = math.cos(0.5 * before_5) * math.cos(0.5 * after_5) * math.cos(0.5 * (move_4 + move_6))
     against = math.sin(0.5 * before_5) * math.sin(0.5 * after_5) * math.cos(0.5 * (move_4 - move_6))

@@ -1,1 +1,1 @@
-"""The grayscale configuration map: what every table angle is worth at every scan location."""
+"""The grayscale configuration map: the value of every table angle at every scan location."""

@@ -56,7 +56,7 @@ class ColumnRater:
         return values, reasons
 
     def metadata(self, T_WS: FloatArray) -> Mapping[str, object]:
-        """Return what a map of locations (n, 4, 4) says of itself, but for its configuration; see `build_maps`."""
+        """Return the metadata of a map of locations (n, 4, 4), without its configuration; see `build_maps`."""
         user_names = [factor.name for factor in self._problem.value.user_factors]
         return {
             "scan": self._problem.name,

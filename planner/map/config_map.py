@@ -1,7 +1,7 @@
 """The grayscale configuration map: f_R over scan locations and table angles (section 3 of the paper, Fig. 6).
 
-The map knows f_R at its samples only. Between samples it is interpolated, and there the border of a forbidden region
-runs somewhere unknown; so a cell counts as allowed only when every sample that has a say in it is allowed.
+The map contains f_R only at its samples. Between samples it is interpolated, and the exact border of a forbidden region
+is unknown there. So a cell counts as allowed only if every sample with a weight in it is allowed.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from planner.kernel import kernel
 # sin(pi)**0.2, Eq. (1) at the end of a joint's range in floating point, is 6.6e-4 and still means "forbidden".
 DEFAULT_EPSILON = 1e-3
 
-# An angle this close to a sample, in samples, lies on it: exact motions arrive with rounding errors.
+# An angle this close to a sample, in samples, is on it: exact motions have rounding errors.
 SAMPLE_TOLERANCE = 1e-9
 
 
@@ -35,7 +35,7 @@ def sample_at_or_above(position: float) -> int:
 
 @kernel
 def wrapped(sample: int, count: int) -> int:
-    """Return `sample` modulo `count`: without an integer division, the slowest operation of a look-up."""
+    """Return `sample` modulo `count` without an integer division, the slowest operation of a look-up."""
     return int(sample - count * np.floor((sample + 0.5) * (1.0 / count)))
 
 
@@ -43,7 +43,7 @@ def wrapped(sample: int, count: int) -> int:
 def column_value(values: FloatArray, epsilon: float, location: int, angle_deg: float) -> float:
     """Return f_R at a scan location and any (unwrapped) table angle; 0 where it is forbidden.
 
-    Linear between the two neighboring samples, and 0 unless each of them that has a weight exceeds `epsilon`.
+    Linear between the two neighboring samples, and 0 unless each of them with a nonzero weight exceeds `epsilon`.
     """
     count: int = values.shape[1]
     position = angle_deg * (count / 360.0)
@@ -65,12 +65,12 @@ def column_value(values: FloatArray, epsilon: float, location: int, angle_deg: f
 def map_value(values: FloatArray, epsilon: float, location: float, angle_deg: float) -> float:
     """Return f_R at any point of the map, between scan locations too; 0 where it is forbidden.
 
-    Bilinear in (location, angle), periodic in angle, and 0 unless each sample that has a weight exceeds `epsilon`.
+    Bilinear in (location, angle), periodic in angle, and 0 unless each sample with a nonzero weight exceeds `epsilon`.
 
     Args:
         values: (n_locations, n_angles) samples of f_R.
-        epsilon: the greatest value that still means "forbidden".
-        location: 0 .. n_locations - 1; fractions lie between two scan locations.
+        epsilon: maximum value that still means "forbidden".
+        location: 0 .. n_locations - 1; fractions are between two scan locations.
         angle_deg: table angle, unwrapped.
     """
     before = sample_at_or_below(location)
@@ -85,7 +85,7 @@ def map_value(values: FloatArray, epsilon: float, location: float, angle_deg: fl
 
 
 class ConfigurationMapError(PlannerError):
-    """Samples of f_R that are no configuration map, or a look-up outside it."""
+    """Samples of f_R that are not a configuration map, or a look-up outside of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +96,9 @@ class ConfigurationMap:
 
     Attributes:
         values: (n_locations, n_angles), 0 (forbidden) to 1.
-        reasons: (n_locations, n_angles) codes that say why a sample is forbidden, or None.
+        reasons: (n_locations, n_angles) codes for why a sample is forbidden, or None.
         epsilon: a pose is allowed ("inrange") where f_R > epsilon.
-        metadata: whatever should travel with the map: configuration, provenance, settings.
+        metadata: additional data of the map: configuration, provenance, settings.
     """
 
     values: FloatArray
@@ -111,9 +111,7 @@ class ConfigurationMap:
         values = np.array(self.values, dtype=np.float64, order="C")
         _check_values(values)
         if not 0.0 <= self.epsilon < 1.0:
-            raise ConfigurationMapError(
-                f"the map's epsilon is {self.epsilon}; allowed is 0 up to, but not including, 1"
-            )
+            raise ConfigurationMapError(f"the map's epsilon is {self.epsilon}; allowed: 0 up to, but not including, 1")
         values.setflags(write=False)
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
@@ -127,7 +125,7 @@ class ConfigurationMap:
 
     @property
     def angle_count(self) -> int:
-        """Number of table angles that are sampled over one turn."""
+        """Number of sampled table angles over one turn."""
         return int(self.values.shape[1])
 
     @property
@@ -147,14 +145,14 @@ class ConfigurationMap:
 
     @property
     def blocked_locations(self) -> tuple[int, ...]:
-        """The scan locations that have no allowed angle at all."""
+        """The scan locations without an allowed angle."""
         return tuple(int(k) for k in np.flatnonzero(~self.allowed.any(axis=1)))
 
     def value(self, location: float, angle_deg: float) -> float:
         """Return the interpolated f_R at a point of the map (see `map_value`); 0 where it is forbidden."""
         if not 0.0 <= location <= self.location_count - 1:
             raise ConfigurationMapError(
-                f"location {location} is off the map; allowed is 0 to {self.location_count - 1}"
+                f"location {location} is outside of the map; allowed: 0 to {self.location_count - 1}"
             )
         return float(map_value(self.values, self.epsilon, float(location), float(angle_deg)))
 
@@ -163,7 +161,7 @@ class ConfigurationMap:
         return self.value(location, angle_deg) > self.epsilon
 
     def forbidden_distance_deg(self, location: int, angle_deg: float) -> float:
-        """Return the way along the angle axis to the nearest forbidden sample of a location; infinite without any."""
+        """Return the distance along the angle axis to the nearest forbidden sample of a location, or infinity."""
         forbidden_deg = self.angles_deg[~self.allowed[location]]
         ways_deg = np.abs((forbidden_deg - angle_deg + 180.0) % 360.0 - 180.0)
         return float(ways_deg.min(initial=np.inf))
@@ -172,13 +170,13 @@ class ConfigurationMap:
 def _check_values(values: FloatArray) -> None:
     if values.ndim != 2 or values.shape[0] < 1 or values.shape[1] < 2:
         raise ConfigurationMapError(
-            f"a configuration map needs values of shape (locations >= 1, angles >= 2); these have shape {values.shape}"
+            f"a configuration map needs values of shape (locations >= 1, angles >= 2); the shape is {values.shape}"
         )
     wrong = ~((values >= 0.0) & (values <= 1.0))
     if wrong.any():
         k, i = (int(index) for index in np.argwhere(wrong)[0])
         raise ConfigurationMapError(
-            f"the map's value at location {k}, angle index {i} is {values[k, i]}; allowed is 0 to 1"
+            f"the map's value at location {k}, angle index {i} is {values[k, i]}; allowed: 0 to 1"
         )
 
 
@@ -186,7 +184,7 @@ def _frozen_reasons(reasons: CodeArray, shape: tuple[int, ...]) -> CodeArray:
     frozen = np.array(reasons, dtype=np.uint8, order="C")
     if frozen.shape != shape:
         raise ConfigurationMapError(
-            f"the map's reasons have shape {frozen.shape}; they need that of its values, {shape}"
+            f"the map's reasons have shape {frozen.shape}; it must be that of its values, {shape}"
         )
     frozen.setflags(write=False)
     return frozen

@@ -1,8 +1,8 @@
 """Compute configuration maps: f_R of every scan location at every table angle, in one or more arm configurations.
 
-One compiled pass does all of a cell's work: the inverse kinematics once for all configurations, the collisions of
-what the flange carries once for all of them, and each further check only where the ones before left the pose alive.
-Memory grows with the maps alone.
+One compiled pass computes a cell completely. The inverse kinematics is computed once for all configurations, and so are
+the collisions of the parts on the flange. Each further check is made only for poses that passed the previous ones. The
+required memory depends only on the size of the maps.
 """
 
 import hashlib
@@ -48,7 +48,7 @@ NO_POSES = np.empty((0, 0, 0, 6)), np.empty((0, 0, 0))
 _MOST_CELLS = 50_000_000
 """Half a gigabyte."""
 _BLOCK_CELLS = 16_384
-"""Cells between two reports of progress: a few milliseconds, and a bound on what user factors are handed at once."""
+"""Cells between two reports of progress: a few milliseconds, and the maximum size of a block for user factors."""
 
 
 def build_maps(
@@ -60,16 +60,16 @@ def build_maps(
     """Return the map of each configuration.
 
     Args:
-        problem: The cell, the path, the value function.
-        configurations: Which ones.
-        n_angles: Number of table angles over one turn.
-        progress: Called with the locations done and all of them, before and after each block; what it raises ends
-            the work.
+        problem: the cell, the path, the value function.
+        configurations: the arm configurations.
+        n_angles: number of table angles over one turn.
+        progress: called with the number of finished locations and of all locations, before and after each block. An
+            exception that it raises ends the computation.
 
     Raises:
-        ConfigurationMapError: The maps would have too many cells.
-        ValueError: A user's factor gave a wrong shape, or something else than numbers in 0..1; or there are more user
-            factors or pairs than a map can tell apart.
+        ConfigurationMapError: the maps would have too many cells.
+        ValueError: a user's factor returned a wrong shape, or values other than numbers in 0..1; or there are more user
+            factors or pairs than a map can distinguish.
     """
     user_factors = problem.value.user_factors
     user_names = [factor.name for factor in user_factors]
@@ -78,9 +78,9 @@ def build_maps(
     shape = (len(configurations), n_locations, n_angles)
     if math.prod(shape) > _MOST_CELLS:
         raise ConfigurationMapError(
-            f"{len(configurations)} map(s) of {n_locations:,} locations and {n_angles:,} angles have"
-            f" {math.prod(shape):,} cells; at most {_MOST_CELLS:,} are allowed: take fewer angles, longer time steps,"
-            " or one configuration"
+            f"the maps of {n_locations:,} locations and {n_angles:,} angles, for {len(configurations)} of 8"
+            f" configurations, have {math.prod(shape):,} cells; at most {_MOST_CELLS:,} are allowed; use fewer angles,"
+            " a longer time step, or one configuration"
         )
     values, reasons = np.empty(shape), np.empty(shape, dtype=np.uint8)
     cells = lay_out_cells(problem, configurations, n_angles)
@@ -89,11 +89,14 @@ def build_maps(
         progress(0, n_locations)
     for first in range(0, n_locations, block):
         last = min(first + block, n_locations)
-        window = values[:, first:last], reasons[:, first:last]
+        # Of its own, in one piece: parts of the maps would be another type, for which numba compiles once more.
+        block_shape = shape[0], last - first, n_angles
+        rated = np.empty(block_shape), np.empty(block_shape, dtype=np.uint8)
         if user_factors:
-            rate_with_user_factors(cells, problem.cell.arm, user_factors, first, *window)
+            rate_with_user_factors(cells, problem.cell.arm, user_factors, first, *rated)
         else:
-            rate_columns(*cells, first, *window, *NO_POSES)
+            rate_columns(*cells, first, *rated, *NO_POSES)
+        values[:, first:last], reasons[:, first:last] = rated
         if progress is not None:
             progress(last, n_locations)
     metadata = {
@@ -111,12 +114,12 @@ def build_maps(
 
 
 def is_compiled() -> bool:
-    """Return whether the machine code of a map is kept from an earlier run."""
+    """Return whether the machine code for a map is stored from an earlier run."""
     return is_kept(rate_columns)
 
 
 class Cells(NamedTuple):
-    """A map problem in the arrays that the kernel takes, in its order."""
+    """A map problem as the arrays for the kernel, in its order."""
 
     arm: FloatArray
     table_poses: FloatArray  # (n_angles, 3, 4): T_BT Rz(theta)
@@ -156,7 +159,7 @@ def lay_out_cells(problem: MapProblem, configurations: Sequence[Configuration], 
 
 
 def digest_of(cells: Cells, user_factor_names: Sequence[str]) -> str:
-    """Return a digest of all that a map depends on, except which configurations were asked for and users' code."""
+    """Return a digest of everything that a map depends on, except the requested configurations and users' code."""
     content = hashlib.sha256("\0".join(user_factor_names).encode())
     for array in cells._replace(slots=np.empty(0, dtype=np.int64)):
         content.update(np.ascontiguousarray(array).tobytes())
@@ -231,9 +234,10 @@ def rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between w
         for angle in range(values.shape[2]):
             _goal_pose(table_poses, angle, T_TF, first + column, flange)
             inverse(arm, flange, joints, codes)
-            # What the flange carries is as far from the cell in all configurations; found when first asked for.
+            # The clearance of the parts on the flange is the same in all configurations; it is computed when first
+            # needed.
             common_mm, common_pair = comfortable_mm, -1
-            # No part turns with joint 4 or 5, so FLIP and NOFLIP have the same clearance.
+            # No part moves with joint 4 or 5, so FLIP and NOFLIP have the same clearance.
             clearance_mm, pair, known_arm = comfortable_mm, -1, -1
             for c in range(len(slots)):
                 slot = slots[c]
@@ -250,7 +254,7 @@ def rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between w
                     if known_arm != slot >> 1:
                         known_arm = slot >> 1
                         clearance_mm, pair = common_mm, common_pair
-                        # A tool that collides does so in every configuration: no need to look further.
+                        # A tool that collides does so in every configuration: no further check is needed.
                         if common_mm > value[MINIMUM_CLEARANCE_MM]:
                             link_frames(arm, joints[slot], arm_frames)
                             place_bodies(bodies, frames, beam_mm, 0, ARM_FRAMES - 1, placed)
@@ -266,7 +270,7 @@ def rate_columns(  # noqa: C901 - one pass over plain arrays: calls in between w
                 reasons[c, column, angle] = reason
                 if clearance_seen.size > 0:
                     clearance_seen[c, column, angle] = clearance_mm
-                    for joint in range(6):  # the assignment of rows brings its texts of errors into the machine code
+                    for joint in range(6):  # the assignment of rows would add its error texts to the machine code
                         joints_seen[c, column, angle, joint] = joints[slot, joint]
 
 
@@ -283,7 +287,7 @@ def _goal_pose(table_poses: FloatArray, angle: int, T_TF: FloatArray, location: 
 
 @kernel
 def _posture_value(value: FloatArray, joints: FloatArray, ranges: FloatArray, slot: int) -> tuple[float, int]:
-    """Return what the joints alone are worth and, where that is nothing, why."""
+    """Return the rating by the joints alone and, if it is 0, the reason."""
     product, least, worst = joints_value(value, joints, ranges, slot)
     wrist = wrist_factor(value, joints[slot, 4])
     if product * wrist > DEFAULT_EPSILON:

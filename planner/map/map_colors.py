@@ -15,7 +15,7 @@ from planner.map.map_reasons import FIRST_PAIR, FIRST_USER_FACTOR
 from planner.reasons import Reason
 
 DARKEST_GRAY = 0.25
-"""The gray of a value of 0: what is allowed must not look forbidden."""
+"""The gray level of the value 0: allowed cells must not look forbidden."""
 
 _KINEMATIC = {
     Reason.OUT_OF_REACH: "#1d3557",
@@ -33,7 +33,7 @@ _OTHER_COLLISIONS = "#f7cdc7"
 
 
 class LegendEntry(NamedTuple):
-    """A reason as it is shown: its text, its color, and the share of the map's cells that it forbids."""
+    """A displayed reason: its text, its color, and its share of the map's cells."""
 
     text: str
     color: str
@@ -41,7 +41,7 @@ class LegendEntry(NamedTuple):
 
 
 def colored(configuration_map: ConfigurationMap) -> tuple[FloatArray, list[LegendEntry]]:
-    """Return the map as an RGB image `(n_angles, n_locations, 3)` and its legend, the most frequent reason first."""
+    """Return the map as an RGB image `(n_angles, n_locations, 3)` and its legend, in descending order of frequency."""
     gray = DARKEST_GRAY + (1.0 - DARKEST_GRAY) * configuration_map.values.T
     image = np.repeat(gray[:, :, None], 3, axis=2)
     reasons = np.zeros(configuration_map.values.shape, dtype=np.uint8)
@@ -58,7 +58,7 @@ def colored(configuration_map: ConfigurationMap) -> tuple[FloatArray, list[Legen
 
 
 def _by_frequency(reasons: CodeArray) -> list[tuple[int, int, str]]:
-    """Return the codes in a map with their counts and colors, the most frequent first."""
+    """Return the codes in a map with their counts and colors, most frequent first."""
     codes, counts = np.unique(reasons[reasons != Reason.REACHED], return_counts=True)
     order = np.argsort(-counts, kind="stable")
     collisions = iter(_COLLISION)

@@ -1,4 +1,4 @@
-"""Configuration maps on disk: one npz file holds the maps of one or more arm configurations with their metadata.
+"""Configuration maps on disk: one npz file contains the maps of one or more arm configurations with their metadata.
 
 `values` is `(n_configurations, n_locations, n_angles)`, `reasons` the same in bytes, `metadata` a JSON text. The same
 maps give the same bytes.
@@ -20,13 +20,13 @@ from protocol.software_version import software_version
 from protocol.whole_file import whole_file
 
 MAP_FILE = "map.npz"
-"""The name of a map's file in a folder of results."""
+"""The name of a map's file in a folder with results."""
 
 _FORMAT = "seventh-axis configuration maps"
 _FORMAT_VERSION = 1
 
 
-# What numpy raises for an npz file that is cut off, foreign, or claims arrays of any size.
+# Exceptions that numpy raises for an npz file that is truncated, foreign, or declares arrays of any size.
 _DAMAGED = (
     ValueError, EOFError, KeyError, AttributeError, TypeError, MemoryError, RecursionError, OverflowError,
     NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error,
@@ -34,15 +34,15 @@ _DAMAGED = (
 
 
 class MapFileError(PlannerError):
-    """A file that cannot be read, is damaged, or holds no configuration maps."""
+    """A file that cannot be read, is damaged, or contains no configuration maps."""
 
 
 def save_maps(file: Path, maps: Mapping[Configuration, ConfigurationMap]) -> None:
-    """Write maps of one scan to `file`, which appears when it is whole.
+    """Write maps of one scan to `file`, which appears when it is complete.
 
     Raises:
-        ValueError: There is no map, or one has no reasons, or they are of different shapes.
-        OSError: The file cannot be written.
+        ValueError: there is no map, or one has no reasons, or their shapes differ.
+        OSError: the file cannot be written.
     """
     if not maps:
         raise ValueError("there is no map to save")
@@ -68,7 +68,7 @@ def load_maps(file: Path) -> dict[Configuration, ConfigurationMap]:
     """Return the maps in a file, by configuration.
 
     Raises:
-        MapFileError: The file cannot be read, is damaged, or is not one of ours.
+        MapFileError: the file cannot be read, is damaged, or was not written by this program.
     """
     arrays = _read(file)
     try:
@@ -83,7 +83,7 @@ def load_maps(file: Path) -> dict[Configuration, ConfigurationMap]:
     except ConfigurationMapError as error:
         raise MapFileError(f"{file}: damaged: {error}") from error
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
-        raise MapFileError(f"{file}: holds no configuration maps that this program has written") from error
+        raise MapFileError(f"{file}: contains no configuration maps of this program") from error
 
 
 def _read(file: Path) -> dict[str, Any]:
@@ -93,7 +93,7 @@ def _read(file: Path) -> dict[str, Any]:
     except OSError as error:
         raise MapFileError(f"{file}: cannot be read ({error.strerror or error})") from error
     except _DAMAGED as error:
-        raise MapFileError(f"{file}: is damaged, or not an npz file at all") from error
+        raise MapFileError(f"{file}: is damaged, or is not an npz file") from error
 
 
 def _check_format(file: Path, metadata: Mapping[str, Any]) -> None:
@@ -106,7 +106,7 @@ def _check_format(file: Path, metadata: Mapping[str, Any]) -> None:
 
 
 def _with_codes(about: dict[str, Any]) -> dict[str, object]:
-    """Return a map's metadata with the codes of its reasons as numbers again: JSON knows texts as keys only."""
+    """Return a map's metadata with the codes of its reasons as numbers again: JSON allows only texts as keys."""
     return about | {"reasons": {int(code): text for code, text in about.get("reasons", {}).items()}}
 
 

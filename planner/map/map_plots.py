@@ -1,4 +1,4 @@
-"""Pictures of a configuration map: flat (Fig. 6a) and rolled up into a tube (Fig. 6b). The same map, the same bytes."""
+"""Plots of a configuration map: flat (Fig. 6a) and rolled up as a tube (Fig. 6b). The same map gives the same bytes."""
 
 from math import ceil
 from pathlib import Path
@@ -28,7 +28,7 @@ def plot_map(configuration_map: ConfigurationMap, file: Path) -> None:
 
 @styled()
 def map_figure(configuration_map: ConfigurationMap) -> Figure:
-    """Return the map as a flat picture: location to the right, table angle upwards; Fig. 6a of the paper."""
+    """Return the map as a flat picture: location to the right, table angle upward; Fig. 6a of the paper."""
     legend = colored(configuration_map)[1]
     figure = new_figure(5.0 + legend_height_in(legend))
     axes = figure.add_subplot()
@@ -41,7 +41,7 @@ def map_figure(configuration_map: ConfigurationMap) -> Figure:
 
 
 def draw_map(axes: Axes, configuration_map: ConfigurationMap) -> None:
-    """Draw the map in its colors, with a mark above each location that no table angle serves."""
+    """Draw the map in its colors, with a mark above each location without an allowed table angle."""
     image, _ = colored(configuration_map)
     half_step = configuration_map.angle_step_deg / 2
     extent = (-0.5, configuration_map.location_count - 0.5, -half_step, 360.0 - half_step)
@@ -66,7 +66,10 @@ def draw_map(axes: Axes, configuration_map: ConfigurationMap) -> None:
 
 @styled()
 def plot_map_cylinder(configuration_map: ConfigurationMap, file: Path) -> None:
-    """Write the map rolled up and seen from two sides, since the table turns without end; Fig. 6b of the paper."""
+    """Write the map rolled up and seen from two sides; Fig. 6b of the paper.
+
+    The table turns without a limit, so the angle axis is closed.
+    """
     image, legend = colored(configuration_map)
     figure = new_figure(6.6 + legend_height_in(legend), 8.0)
     for axes, center_deg in zip(figure.subplots(2, 1), (180.0, 0.0), strict=True):
@@ -78,9 +81,9 @@ def plot_map_cylinder(configuration_map: ConfigurationMap, file: Path) -> None:
 
 
 _LENGTH = 4.0
-"""Of the tube, in radii."""
+"""Dimensions of the tube, in radii."""
 _BULGE = 0.3
-"""How far the near half of a rim is drawn to the left of its ends, and the far half to the right, in radii."""
+"""Distance in radii by which the near half of an end is drawn to the left, and the far half to the right."""
 
 
 def _draw_tube(axes: Axes, image: FloatArray, center_deg: float) -> None:
@@ -110,10 +113,10 @@ def _draw_tube(axes: Axes, image: FloatArray, center_deg: float) -> None:
 
 
 def _tube(image: FloatArray, center_deg: float, width: int, height: int) -> FloatArray:
-    """Return an RGBA picture of an open tube with the image on its wall, `center_deg` of it in front.
+    """Return an RGBA picture of an open tube with the image on its wall, and `center_deg` in front.
 
-    A wall point at location s and angle phi from the front is drawn at (s - bulge cos(phi), sin(phi)), so each
-    pixel shows the near half where that is there, else the inside of the far half.
+    A point of the wall at location s and angle phi from the front is drawn at (s - bulge cos(phi), sin(phi)). So each
+    pixel shows the near half if it is there, else the inside of the far half.
     """
     x = -_BULGE + (_LENGTH + 2 * _BULGE) * (np.arange(width * _SAMPLES) + 0.5) / (width * _SAMPLES)
     y = -1.0 + 2.0 * (np.arange(height * _SAMPLES) + 0.5) / (height * _SAMPLES)
@@ -128,7 +131,7 @@ def _tube(image: FloatArray, center_deg: float, width: int, height: int) -> Floa
         column = np.floor(s * image.shape[1]).astype(int)
         picture[seen, :3] = image[row[seen], column[seen]] * shade[seen, None]
         picture[seen, 3] = 1.0
-    # Colors weighted by their cover, or the rim would get a dark seam.
+    # Colors weighted by their coverage; otherwise the edge would have a dark seam.
     samples = picture.reshape(height, _SAMPLES, width, _SAMPLES, 4)
     cover = samples[..., 3].mean(axis=(1, 3))
     color = (samples[..., :3] * samples[..., 3:]).mean(axis=(1, 3)) / np.maximum(cover, 1e-9)[..., None]
@@ -150,12 +153,12 @@ def draw_grays(figure: Figure, axes: Axes | list[Axes]) -> None:
 
 
 def legend_height_in(legend: list[LegendEntry]) -> float:
-    """Return the height that `draw_legend` needs."""
+    """Return the required height for `draw_legend`."""
     return 0.22 * ceil(len(legend) / _LEGEND_COLUMNS)
 
 
 def draw_legend(figure: Figure, legend: list[LegendEntry]) -> None:
-    """Draw below the figure what the colors of the forbidden cells mean."""
+    """Draw the legend for the colors of the forbidden cells below the figure."""
     if legend:
         figure.legend(
             [Patch(facecolor=entry.color) for entry in legend],

@@ -1,4 +1,4 @@
-"""What a configuration map depends on, put together from a scan."""
+"""Everything that a configuration map depends on, derived from a scan."""
 
 from dataclasses import dataclass
 
@@ -13,15 +13,15 @@ from protocol.progress import Progress
 
 @dataclass(frozen=True, eq=False)
 class MapProblem:
-    """A cell, a path through it, what can collide there, and how poses are rated.
+    """A cell, a path through it, possible collisions, and the rating of poses.
 
     Attributes:
-        name: What the scan is called.
-        cell: The arm, the table and the probe.
+        name: name of the scan.
+        cell: the arm, the table and the probe.
         T_WS: `(n_locations, 4, 4)`, the scan locations.
-        collision: What can collide.
-        pair_names: The name of each of its pairs.
-        value: The value function.
+        collision: the collision model.
+        pair_names: the name of each of its pairs.
+        value: the value function.
     """
 
     name: str
@@ -36,9 +36,9 @@ def map_problem(scan: Scan, progress: Progress | None = None) -> MapProblem:
     """Return the map problem of a scan.
 
     Args:
-        scan: The scan.
-        progress: Called with the points done and all points while the workpiece's distance field is built, which
-            happens once for each shape.
+        scan: the scan.
+        progress: called with the number of finished points and of all points while the distance field of the workpiece
+            is computed, once for each shape.
     """
     obstacles = (*cell_obstacles(scan.cell), workpiece_obstacle(scan, progress))
     model, pair_names = collision_model(scan.bodies, obstacles, scan.cell.T_BT, scan.cell.T_FS)

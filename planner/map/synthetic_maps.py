@@ -1,4 +1,4 @@
-"""Seeded configuration maps with known difficulty, for tests, benchmarks and figures."""
+"""Random configuration maps of known difficulty with a fixed seed, for tests, benchmarks and figures."""
 
 from typing import NamedTuple
 
@@ -10,12 +10,12 @@ from planner.map.config_map import ConfigurationMap
 
 
 class MapFamily(NamedTuple):
-    """What the maps of a family have in common.
+    """The common properties of the maps of a family.
 
     Attributes:
-        forbidden: share of the map that is forbidden, about.
+        forbidden: approximate share of the map that is forbidden.
         obstacle_size: scale of the forbidden regions, in samples.
-        slope: drift of the whole pattern, in samples of angle a column: the table has to turn to follow it.
+        slope: drift of the whole pattern, in samples of angle per column: the table has to turn to follow it.
         location_count: columns.
         angle_count: samples of angle.
     """

@@ -1,4 +1,7 @@
-"""Plans that the arm can follow: those of a planner, and where the arm refuses one, the best of a search with turns."""
+"""Plans that the arm can follow.
+
+If the arm cannot follow a planner's own plan, a search that includes the turns of the joints finds another.
+"""
 
 from collections.abc import Iterator
 from functools import wraps
@@ -6,29 +9,31 @@ from functools import wraps
 import numpy as np
 
 from planner.arrays import BoolArray
-from planner.planning.arm_motion import arm_motion
-from planner.planning.arm_on_path import ArmOnPath
-from planner.planning.joint_turns import Margin, lay_out_turns
-from planner.planning.lattice import Lattice, speed_unit
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.plan import Infeasibility, NoPlan, Outcome, Plan, Planner, make_plan, motion_of
-from planner.planning.problem import Problem
-from planner.planning.turn_search import MOST_SPEEDS, NotFound, find_path, node_joints
+from planner.plans.arm_motion import arm_motion
+from planner.plans.arm_on_path import ArmOnPath
+from planner.plans.plan import Infeasibility, NoPlan, Outcome, Plan, Planner, make_plan, motion_of
+from planner.plans.problem import Problem
+from planner.search.joint_turns import Margin, lay_out_turns
+from planner.search.lattice import Lattice, speed_unit
+from planner.search.lattice_choice import turn_lattice
+from planner.search.node_joints import node_joints
+from planner.search.turn_search import MOST_SPEEDS, NotFound, find_path
 from planner.table.motion import Motion
 
-# A motion of least cost runs along a limit, so the first search keeps off. Where there is no way, the others do not.
+# A motion of minimum cost runs along a limit, so the first search keeps a distance from the limits. If it finds
+# nothing, the others use the full range.
 COMFORTABLE, TIGHT = Margin(5.0, 0.95), Margin(1e-6, 1.0 - 1e-6)
 
-# Speeds each way of the lattices, and steps per sample of a column at most.
+# Maximum number of speeds in each direction of the lattices, and of steps per sample of a column.
 SPEED_COUNTS = 20, 32
 WORK_PER_SAMPLE = 40_000
 
-# Of the tubes around a plan in which it is refined, each way; from one pass to the next they are half as wide.
+# The tubes around a plan for refinement, in each direction; from one pass to the next they are half as wide.
 TUBE_Q, TUBE_SPEEDS, PASSES = 24, 6, 6
 
 
 def obeying_the_arm(planner: Planner) -> Planner:
-    """Return the planner with other plans where the arm of the problem cannot follow its own."""
+    """Return the planner with other plans if the arm of the problem cannot follow its own."""
 
     @wraps(planner)
     def plan(problem: Problem) -> Outcome:
@@ -41,12 +46,12 @@ def obeying_the_arm(planner: Planner) -> Planner:
 
 
 def plan_with_turns(problem: Problem, on_path: ArmOnPath, followed: Plan) -> Outcome:
-    """Return the cheapest motion of the first lattice on which the arm has one, refined.
+    """Return the cheapest motion that the arm can follow on the first lattice with such a motion, refined.
 
     Args:
-        problem: what is to be crossed.
-        on_path: the arm that has to follow.
-        followed: a plan that it cannot follow; the answer has its name.
+        problem: the problem.
+        on_path: the arm.
+        followed: a plan that the arm cannot follow; the result has its name.
     """
     reached = NotFound(0, None)
     for lattice, margins in lattices(problem, followed):
@@ -64,7 +69,7 @@ def plan_with_turns(problem: Problem, on_path: ArmOnPath, followed: Plan) -> Out
 
 
 def lattices(problem: Problem, plan: Plan) -> Iterator[tuple[Lattice, tuple[Margin, ...]]]:
-    """Yield lattices over the whole turn, and the margins to search each with: around rest, around a plan, finer."""
+    """Yield lattices over the whole turn, and the margins for each search: around rest, around a plan, finer."""
     coarse, fine = SPEED_COUNTS
     for speed_count, reference, margins in (
         (coarse, None, (COMFORTABLE, TIGHT)),
@@ -90,14 +95,14 @@ def start_states(problem: Problem, lattice: Lattice) -> BoolArray:
     return starts
 
 
-# Rounding of a start, in deg and deg/s.
+# Rounding error of a start, in deg and deg/s.
 _SAME = 1e-9
 
 
 def refine_with_turns(problem: Problem, on_path: ArmOnPath, plan: Plan, margin: Margin, node_deg: float) -> Plan:
     """Return a plan of at most the same cost that the arm can follow within the same margin.
 
-    See `iterative_dynamic_programming.py`: searches in ever narrower tubes around the plan.
+    See `iterative_dynamic_programming.py`: searches in increasingly narrow tubes around the plan.
     """
     for halvings in range(PASSES):
         tube = Lattice(motion_of(plan), node_deg / 2**halvings, TUBE_SPEEDS, -TUBE_Q, 2 * TUBE_Q + 1, is_closed=False)

@@ -1,13 +1,13 @@
-"""Which arm configuration to scan in: the one whose map has the cheapest plan."""
+"""Choose the arm configuration for a scan: the one whose map has the cheapest plan."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
 from planner.cell.scan import Scan
 from planner.cell.unit_hints import unit_hint
-from planner.planning.arm_motion import arm_follows
-from planner.planning.plan import Infeasibility, NoPlan, Outcome, Plan, Planner
-from planner.planning.problem import Problem
+from planner.plans.arm_motion import arm_follows
+from planner.plans.plan import Infeasibility, NoPlan, Outcome, Plan, Planner
+from planner.plans.problem import Problem
 from protocol.progress import Progress
 
 
@@ -15,9 +15,9 @@ class Comparison(NamedTuple):
     """One outcome per arm configuration.
 
     Attributes:
-        outcomes: what the planner answered, by configuration, in the order asked.
-        best: the configuration of the cheapest plan that the arm can follow, the first of equal ones; where it can
-            follow none, of the cheapest plan; None where there is no plan.
+        outcomes: result of the planner by configuration, in the given order.
+        best: the configuration of the cheapest plan that the arm can follow, the first of equal ones. If it can follow
+            none, that of the cheapest plan; None without a plan.
     """
 
     outcomes: Mapping[str, Outcome]
@@ -25,18 +25,21 @@ class Comparison(NamedTuple):
 
     @property
     def farthest(self) -> tuple[str, NoPlan]:
-        """Where there is no plan, the configuration that gets farthest, and why no farther."""
+        """If there is no plan, the configuration that gets farthest, and why no farther."""
         refused = {name: each for name, each in self.outcomes.items() if isinstance(each, NoPlan)}
         return max(refused.items(), key=lambda item: item[1].location or 0)
 
     @property
     def refusal(self) -> str:
-        """The same in words."""
+        """The same as text."""
         name, no_plan = self.farthest
         return f"{name} gets farthest: {no_plan.reason}"
 
     def why_no_plan(self, scan: Scan) -> str:
-        """Return in one sentence why a scan has no plan; where whole locations are blocked, a wrong unit may be why."""
+        """Return in one sentence why a scan has no plan.
+
+        If whole locations are blocked, a wrong unit may be the reason.
+        """
         reason = f"{scan.name}: there is no plan; {self.refusal}"
         refused = [each for each in self.outcomes.values() if isinstance(each, NoPlan)]
         is_blocked = all(each.infeasibility is Infeasibility.BLOCKED_LOCATION for each in refused)
@@ -49,12 +52,13 @@ def best_configuration(
 ) -> Comparison:
     """Plan for each arm configuration and compare.
 
-    Costs of different configurations compare only under equal weights, limits and start; that is up to the caller.
+    Costs of different configurations can be compared only with equal weights, limits and start; the caller ensures
+    this.
 
     Args:
         problems: one problem per configuration, each with its own map.
-        planner: the planner to compare by.
-        progress: called with the configurations done and all of them, before and after each.
+        planner: the planner for the comparison.
+        progress: called with the number of finished configurations and of all configurations, before and after each.
     """
     outcomes: dict[str, Outcome] = {}
     for name, problem in problems.items():

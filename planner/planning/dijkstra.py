@@ -1,8 +1,8 @@
-"""The paper's reference: the shortest path in an explicit graph, by scipy.
+"""The paper's reference: the shortest path in an explicit graph, with scipy.
 
-Eq. (8) snaps each state to a cell. Off an exact lattice a snapped path is no motion: carried out, it drifts and enters
-forbidden regions. So the cells here are the nodes of a lattice on which every step ends exactly on a node. The path in
-the graph is the motion, and the optimum of that lattice.
+Eq. (8) rounds each state to a cell. Off an exact lattice, a rounded path is not a motion: if it is executed, it drifts
+into forbidden regions. So the cells here are the nodes of a lattice on which every step ends exactly on a node. The
+path in the graph is the motion, and the optimum of that lattice.
 """
 
 from typing import NamedTuple
@@ -16,16 +16,16 @@ from planner.arrays import FloatArray, IndexArray
 from planner.defaults import DIJKSTRA
 from planner.kernel import kernel
 from planner.map.config_map import column_value, wrapped
-from planner.planning.crossing import step_is_allowed
-from planner.planning.lattice import Lattice, motion_along, speed_unit
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.lattice_cost_to_go import steps_from
-from planner.planning.plan import Infeasibility, NoPlan, Outcome, make_plan, obvious_infeasibility
-from planner.planning.problem import Problem, Terms
+from planner.plans.crossing import step_is_allowed
+from planner.plans.plan import Infeasibility, NoPlan, Outcome, make_plan, obvious_infeasibility
+from planner.plans.problem import Problem, Terms
+from planner.search.lattice import Lattice, motion_along, speed_unit
+from planner.search.lattice_choice import turn_lattice
+from planner.search.lattice_cost_to_go import steps_from
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import Motion
 
-# Speeds each way, from what is wanted to what must do; scipy needs 40 bytes an edge.
+# Speeds in each direction, from the preferred to the minimum number; scipy needs 40 bytes per edge.
 SPEED_COUNTS = (10, 7, 5, 3, 2, 1)
 MOST_EDGES = 15_000_000
 
@@ -43,12 +43,12 @@ class ShortestPath(NamedTuple):
 
 
 class Edges(NamedTuple):
-    """The edges of all nodes in turn; a node is (column, speed, q), q last.
+    """The edges of all nodes in order; a node is (column, speed, q), with q as the fastest index.
 
     Attributes:
-        lengths: cost of each, plus an offset.
-        targets: the node that each leads to.
-        ends: (n_nodes,) where those of each node end.
+        lengths: cost of each edge, plus an offset.
+        targets: target node of each edge.
+        ends: (n_nodes,) end of the edges of each node.
     """
 
     lengths: FloatArray
@@ -57,7 +57,10 @@ class Edges(NamedTuple):
 
 
 def dijkstra(problem: Problem, lattice: Lattice | None = None) -> Outcome:
-    """Return the shortest path in the graph of a lattice; without one, of the finest of a few that fits into memory."""
+    """Return the shortest path in the graph of a lattice.
+
+    By default, it is the finest of a few lattices that fit into memory.
+    """
     no_plan = obvious_infeasibility(problem, DIJKSTRA)
     if no_plan is not None:
         return no_plan
@@ -72,8 +75,8 @@ def _lattice_that_fits(problem: Problem) -> Lattice | None:
 
 
 def shortest_path(problem: Problem, lattice: Lattice) -> ShortestPath | None:
-    """Return the shortest path in the graph of a lattice around the turn; None where there is none."""
-    # The library takes an edge of length 0 for none. All paths have n edges, so an offset changes nothing.
+    """Return the shortest path in the graph of a lattice around the turn; None if there is none."""
+    # The library treats an edge of length 0 as missing. All paths have n edges, so an offset changes nothing.
     offset = problem.greatest_step_cost
     edges = _edges(problem.terms, lattice, offset)
     graph = _graph_with_source(edges, _start_nodes(problem, lattice))
@@ -105,7 +108,7 @@ def _start_nodes(problem: Problem, lattice: Lattice) -> IndexArray:
 
 
 def _graph_with_source(edges: Edges, sources: IndexArray) -> csr_array:
-    """Return the graph with one more node, the last, from which all starts are one edge of length 1 away."""
+    """Return the graph with one more node, the last, which has an edge of length 1 to each start."""
     count = len(edges.ends)
     data = np.concatenate((edges.lengths, np.ones(len(sources))))
     indices = np.concatenate((edges.targets, sources.astype(np.int32)))

@@ -1,49 +1,49 @@
 """The default planner: the best path of an exact lattice, refined until no grid limits it.
 
-Where the lattice has no way, finer means take turns: a proof that there is none, the exact sets of crossable angles,
-and a finer lattice. Each turn doubles the speeds that they use.
+If the lattice has no path, finer methods are used in turn: a proof that there is none, the exact sets of crossable
+angles, and a finer lattice. Each round doubles the number of speeds.
 """
 
 from dataclasses import replace
 from typing import NamedTuple
 
 from planner.defaults import DYNAMIC_PROGRAMMING
-from planner.planning.crossable_intervals import crossing_motion
 from planner.planning.interpolated_planner import interpolated_plan
 from planner.planning.iterative_dynamic_programming import best_around, refine, tube
-from planner.planning.lattice import Lattice
-from planner.planning.lattice_choice import EXACTLY, NEARLY, limits_rounded_up, turn_lattice, with_limits_rounded_up
-from planner.planning.lattice_search import best_motion
-from planner.planning.plan import Infeasibility, NoPlan, Outcome, Plan, make_plan, obvious_infeasibility
-from planner.planning.problem import Problem
-from planner.planning.unreachability_proof import first_unreachable_location
-from planner.planning.verification import verify
+from planner.plans.plan import Infeasibility, NoPlan, Outcome, Plan, make_plan, obvious_infeasibility
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
+from planner.search.crossable_intervals import crossing_motion
+from planner.search.lattice import Lattice
+from planner.search.lattice_choice import EXACTLY, NEARLY, limits_rounded_up, turn_lattice, with_limits_rounded_up
+from planner.search.lattice_search import best_motion
+from planner.search.unreachability_proof import first_unreachable_location
 from planner.table.motion import Motion
 
-# The first lattice: its speeds each way, at least, and which share of the greatest speed it must have, from what is
-# wanted to what must do; and how many steps it may have per column, or in total on a short path.
+# The first lattice. Its minimum number of speeds in each direction. The share of the maximum speed that it must
+# include, from the preferred to the minimum value. Its maximum number of steps per column, or in total on a short path.
 SPEEDS = ((8, NEARLY), (8, 0.9), (5, 0.9), (3, 0.8))
 WORK, TOTAL_WORK = 130_000, 13_000_000
 
-# The same in total on a finer lattice, about a second.
+# The total on a finer lattice, about a second.
 MOST_WORK = 1_000_000_000
 
 # The tube around a path that exceeds the limits.
 WIDE_SPEEDS_EACH_WAY, WIDE_Q_COUNT = 8, 48
 
-# What that path had promised is kept up to this share of its cost.
+# The lower cost of that path is kept up to this share.
 KEPT = 1.005
 
 
 class Effort(NamedTuple):
-    """How hard to search where the first lattice has no way.
+    """The effort of the search if the first lattice has no path.
 
     Attributes:
         cells: cells of speed for the proof.
         speeds_per_gain: speeds of the crossable intervals.
-        speed_count: speeds each way of the lattice.
-        share: of the greatest speed that the lattice must have.
-        work: steps of the lattice per column, at most.
+        speed_count: speeds in each direction of the lattice.
+        share: share of the maximum speed that the lattice must include.
+        work: maximum number of steps of the lattice per column.
     """
 
     cells: int
@@ -63,9 +63,9 @@ EFFORTS = (
 
 
 def dynamic_programming(problem: Problem) -> Outcome:
-    """Return the plan of least cost, or why there is none.
+    """Return the plan of minimum cost, or the reason why there is none.
 
-    It costs at most what the best path of a lattice costs that has 20 speeds each way, to about a percent.
+    Its cost is at most that of the best path of a lattice with 20 speeds in each direction, within about a percent.
     """
     no_plan = obvious_infeasibility(problem, DYNAMIC_PROGRAMMING)
     if no_plan is not None:
@@ -75,7 +75,7 @@ def dynamic_programming(problem: Problem) -> Outcome:
 
 
 def first_plan(problem: Problem) -> Plan | None:
-    """Return the best plan of the lattice that there is time for, refined; None where that has none."""
+    """Return the best plan of the largest affordable lattice, refined; None if it has none."""
     lattice = first_lattice(problem)
     if lattice is not None:
         return lattice_plan(problem, lattice)
@@ -88,7 +88,7 @@ def first_plan(problem: Problem) -> Plan | None:
 
 
 def first_lattice(problem: Problem, reference: Motion | None = None) -> Lattice | None:
-    """Return the lattice that there is time for; None where even a coarse one takes too many steps."""
+    """Return the largest affordable lattice; None if even a coarse one has too many steps."""
     work = max(WORK, TOTAL_WORK // problem.step_count)
     lattices = (turn_lattice(problem, count, work, reference, share) for count, share in SPEEDS)
     return next((lattice for lattice in lattices if lattice is not None), None)
@@ -97,9 +97,9 @@ def first_lattice(problem: Problem, reference: Motion | None = None) -> Lattice 
 def lattice_plan(problem: Problem, lattice: Lattice) -> Plan | None:
     """Return the best plan of a lattice, refined.
 
-    A lattice rounds the limits down to its own speeds, which may bar the best way around the forbidden regions. So the
-    limits are first rounded up; where the best path then exceeds them, tubes around it are searched within the limits.
-    Only where that costs clearly more than the path had promised is the lattice searched within the limits, too.
+    A lattice rounds the limits down to its own speeds, which may exclude the best path around the forbidden regions. So
+    the limits are first rounded up. If the best path then exceeds them, tubes around it are searched within the limits.
+    Only if the result costs clearly more than that path is the whole lattice searched within the limits, too.
     """
     tempting = best_motion(problem, with_limits_rounded_up(lattice, problem), limits_rounded_up(lattice, problem))
     if tempting is None:
@@ -120,7 +120,7 @@ def lattice_plan(problem: Problem, lattice: Lattice) -> Plan | None:
 
 
 def search_harder(problem: Problem) -> Outcome:
-    """Return a plan, or the proof that there is none, by finer and finer means, each of bounded effort."""
+    """Return a plan, or the proof that there is none, by increasingly fine methods, each with bounded effort."""
     for effort in EFFORTS:
         location = first_unreachable_location(problem, effort.cells)
         if location is not None:
@@ -139,7 +139,7 @@ def _plan_on_finer_lattice(problem: Problem, effort: Effort) -> Plan | None:
 
 
 def _plan_through_intervals(problem: Problem, effort: Effort) -> Plan | None:
-    """Return a plan through the crossable intervals, made good: first anywhere on the map, then nearby."""
+    """Return a plan through the crossable intervals, optimized: first anywhere on the map, then near it."""
     motion = crossing_motion(problem, effort.speeds_per_gain)
     if motion is None:
         return None

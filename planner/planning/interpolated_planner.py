@@ -1,9 +1,9 @@
-"""A plan from the interpolated cost-to-go: follow it forwards with exact kinematics.
+"""A plan from the interpolated cost-to-go: follow it forward with exact kinematics.
 
-The cost-to-go (`cost_to_go.py`) knows only states of its grid. The plan is rolled out from it: at each column every
-reachable speed of the grid is tried, with Eq. (3) and (4), the exact check of the motion between the columns and the
-exact cost, and the cheapest continuation is taken. Where the interpolated cost-to-go promised a continuation that the
-exact motion does not have, the roll-out steps back and takes the next best.
+The cost-to-go (`cost_to_go.py`) exists only for states of its grid. The plan is computed forward from it: at each
+column every reachable speed of the grid is tried, with Eq. (3) and (4), the exact check of the motion between the
+columns and the exact cost, and the cheapest continuation is used. If the interpolated cost-to-go contains a
+continuation that the exact motion does not have, the computation steps back and uses the next best.
 """
 
 import numpy as np
@@ -11,30 +11,30 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.kernel import kernel
 from planner.map.config_map import column_value
-from planner.planning.cost_to_go import CostToGo, cost_from, cost_to_go
-from planner.planning.crossing import step_is_allowed
-from planner.planning.plan import Plan, make_plan
-from planner.planning.problem import Problem, Terms
-from planner.planning.state_grid import Grid, default_grid
+from planner.plans.crossing import step_is_allowed
+from planner.plans.plan import Plan, make_plan
+from planner.plans.problem import Problem, Terms
+from planner.search.cost_to_go import CostToGo, cost_from, cost_to_go
+from planner.search.state_grid import Grid, default_grid
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import next_angle, next_speed, roll_out
 
 NAME = "interpolated"
 
-# How often the roll-out may step back, per column.
+# Maximum number of steps back, per column.
 STEPS_BACK_PER_COLUMN = 50
 
-# A free start is looked for at so many angles per sample of the map.
+# A free start is searched at this many angles per sample of the map.
 STARTS_PER_SAMPLE = 4
 
 
 def interpolated_plan(problem: Problem, grid: Grid | None = None) -> Plan | None:
-    """Return a plan of nearly the least cost; None where the interpolation finds none, which proves nothing."""
+    """Return a plan of nearly minimum cost; None if the interpolation finds none, which proves nothing."""
     return follow(problem, cost_to_go(problem, default_grid(problem) if grid is None else grid))
 
 
 def follow(problem: Problem, to_go: CostToGo) -> Plan | None:
-    """Roll the best motion out along a cost-to-go; None where it finds no way across."""
+    """Compute the best motion along a cost-to-go; None if it finds no path across."""
     for angle_deg, speed_deg_s in _starts(problem, to_go):
         accelerations = _follow(problem.terms, to_go, angle_deg, speed_deg_s)
         if len(accelerations) == problem.step_count:
@@ -44,7 +44,7 @@ def follow(problem: Problem, to_go: CostToGo) -> Plan | None:
 
 
 def _starts(problem: Problem, to_go: CostToGo, count: int = 3) -> list[tuple[float, float]]:
-    """Return the start, or the `count` most promising ones where it is free."""
+    """Return the start, or the `count` most promising ones if it is free."""
     if problem.start_angle_deg is None:
         angles = np.linspace(0.0, 360.0, problem.map.angle_count * STARTS_PER_SAMPLE, endpoint=False)
     else:
@@ -72,9 +72,9 @@ def _start_costs(terms: Terms, to_go: CostToGo, angles_deg: FloatArray, speeds_d
 
 @kernel
 def continuation_costs(terms: Terms, to_go: CostToGo, column: int, angle_deg: float, speed_deg_s: float) -> FloatArray:
-    """Return, per speed of the grid, what it costs to reach it in the next column and to go on to the last.
+    """Return, per speed of the grid, the cost of reaching it in the next column and continuing to the last.
 
-    Infinite where the acceleration exceeds its limit, the way there is forbidden or there is no way on.
+    Infinity if the acceleration exceeds its limit, the motion is forbidden or there is no continuation.
     """
     grid, costs = to_go.grid, to_go.costs
     result = np.full(costs.shape[1], np.inf)
@@ -99,7 +99,7 @@ def continuation_costs(terms: Terms, to_go: CostToGo, column: int, angle_deg: fl
 
 @kernel
 def acceleration_to(terms: Terms, grid: Grid, speed_deg_s: float, target: int) -> float:
-    """Return the acceleration that leads to a speed of the grid in one step, rounded into the limit."""
+    """Return the acceleration that leads to a speed of the grid in one step, clamped to the limit."""
     acceleration = ((target - grid.half_count) * grid.speed_step_deg_s - speed_deg_s) / terms.step_s
     limit = terms.acceleration_limit_deg_s2
     return max(-limit, min(limit, acceleration))
@@ -107,7 +107,7 @@ def acceleration_to(terms: Terms, grid: Grid, speed_deg_s: float, target: int) -
 
 @kernel
 def _follow(terms: Terms, to_go: CostToGo, angle_deg: float, speed_deg_s: float) -> FloatArray:
-    """Return the (n,) accelerations of the best motion from a start; fewer where it finds no way across."""
+    """Return the (n,) accelerations of the best motion from a start; fewer if it finds no path across."""
     steps = len(to_go.costs) - 1
     angles, speeds, accelerations = np.empty(steps + 1), np.empty(steps + 1), np.empty(steps)
     angles[0], speeds[0] = angle_deg, speed_deg_s

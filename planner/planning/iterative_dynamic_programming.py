@@ -1,23 +1,23 @@
-"""Refine a plan: dynamic programming in a tube around it, again and again, on ever finer lattices (Luus, 1990).
+"""Refine a plan by repeated dynamic programming in a tube around it, on increasingly fine lattices (Luus, 1990).
 
-The lattice is laid around the plan itself. Offset 0 is the plan, so a pass can never lose it; a pass is kept only if
-the exact cost falls. The result is limited by no grid any more, only by the way that the plan takes around obstacles.
+The lattice is centered on the plan itself. Offset 0 is the plan, so a pass can never lose it; a pass is kept only if
+the exact cost decreases. In the end, no grid limits the result, only the path that the plan takes around obstacles.
 """
 
 from collections.abc import Callable
 
-from planner.planning.lattice import Lattice
-from planner.planning.lattice_search import best_motion
-from planner.planning.plan import Plan, make_plan, motion_of
-from planner.planning.problem import Problem
+from planner.plans.plan import Plan, make_plan, motion_of
+from planner.plans.problem import Problem
+from planner.search.lattice import Lattice
+from planner.search.lattice_search import best_motion
 
-# The tube: speeds each way, and q from -Q_COUNT / 2 up. Eight single numbers make a vector.
+# The tube: speeds in each direction, and q from -Q_COUNT / 2 up. Eight single-precision numbers are one vector.
 SPEEDS_EACH_WAY = 4
 Q_COUNT = 16
 
 PASSES = 4
 
-# The spacing stays where a pass gains more than this share.
+# The spacing stays the same while a pass gains more than this share.
 LARGE_GAIN = 0.01
 MOST_PASSES = 12
 
@@ -31,10 +31,10 @@ def refine(problem: Problem, plan: Plan, node_deg: float, accepts: Callable[[Pla
     """Return a plan of at most the same cost, with the same name.
 
     Args:
-        problem: what is crossed.
-        plan: where to begin; without pauses.
-        node_deg: spacing to begin with, halved from pass to pass.
-        accepts: what else a plan must fulfill; a pass whose plan it refuses is not kept.
+        problem: the problem.
+        plan: the initial plan, without pauses.
+        node_deg: initial spacing, halved from pass to pass.
+        accepts: an additional condition for a plan; a pass with a refused plan is not kept.
     """
     passes = 0
     for _ in range(MOST_PASSES):
@@ -56,7 +56,7 @@ def tube(plan: Plan, node_deg: float, speeds_each_way: int = SPEEDS_EACH_WAY, q_
 
 
 def best_around(problem: Problem, plan: Plan, lattice: Lattice) -> Plan:
-    """Return the best plan of a lattice around a plan: that plan where none is cheaper."""
+    """Return the best plan of a lattice around a plan: that plan if none is cheaper."""
     motion = best_motion(problem, lattice)
     if motion is None:
         return plan

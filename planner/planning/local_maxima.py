@@ -1,18 +1,18 @@
-"""The "local maxima path" that the paper compares with: at each location the angle with the greatest f_R."""
+"""The "local maxima path" of the paper's comparison: at each location the angle with the maximum f_R."""
 
 import numpy as np
 
 from planner.defaults import LOCAL_MAXIMA
-from planner.planning.plan import Outcome, greedy_start, make_plan, obvious_infeasibility
-from planner.planning.problem import Problem
+from planner.plans.plan import Outcome, greedy_start, make_plan, obvious_infeasibility
+from planner.plans.problem import Problem
 from planner.table.motion import motion_through_angles
 
 
 def local_maxima(problem: Problem) -> Outcome:
-    """Return the path through the brightest angle of each location, by the shorter way round.
+    """Return the path through the angle with the maximum value of each location, in the shorter direction.
 
-    It minds neither limits nor what lies between two locations: a baseline, not a motion to execute. Its speeds and
-    accelerations are the only ones that meet these angles under Eq. (3) and (4).
+    It ignores limits and what is between two locations: a baseline, not a motion to execute. Its speeds and
+    accelerations are the only ones with these angles under Eq. (3) and (4).
     """
     no_plan = obvious_infeasibility(problem, LOCAL_MAXIMA)
     if no_plan is not None:

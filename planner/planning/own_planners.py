@@ -1,4 +1,4 @@
-"""Planners by name: those that are shipped, and those of other packages, whose answers are checked."""
+"""Planners by name: the shipped ones, and those of other packages, whose results are checked."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,10 +7,10 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.defaults import PLANNER_NAMES
-from planner.planning.plan import Infeasibility, NoPlan, Outcome, Pause, Plan, Planner, path_cost
-from planner.planning.plan_check import plan_fault
 from planner.planning.planners import PLANNERS
-from planner.planning.problem import Problem
+from planner.plans.plan import Infeasibility, NoPlan, Outcome, Pause, Plan, Planner, path_cost
+from planner.plans.plan_check import plan_fault
+from planner.plans.problem import Problem
 from planner.plug_ins import PLANNER_GROUP, PlugInError, failure, load_plug_in, plug_in_names
 from planner.reasons import Reason
 
@@ -24,7 +24,7 @@ def planner_named(name: str) -> Planner:
     """Return a planner.
 
     Raises:
-        PlugInError: There is none of that name, or it cannot be loaded.
+        PlugInError: there is no planner with that name, or it cannot be loaded.
     """
     if name in PLANNERS:
         return PLANNERS[name]
@@ -35,9 +35,9 @@ def planner_named(name: str) -> Planner:
 
 
 def checked(name: str, function: Callable[[Problem], Any]) -> Planner:
-    """Return a planner that somebody brings, with its name and cost set here, and refused where it breaks the rules.
+    """Return a user's planner. Its name and cost are set here, and invalid results are refused.
 
-    What it returns raises PlugInError unless it is a `NoPlan`, or a `Plan` that answers the problem.
+    A result raises PlugInError unless it is a `NoPlan`, or a `Plan` for the problem.
     """
 
     def plan(problem: Problem) -> Outcome:
@@ -53,21 +53,21 @@ def checked(name: str, function: Callable[[Problem], Any]) -> Planner:
             return _restated_plan(problem, name, outcome)
         except PlugInError:
             raise
-        except Exception as error:  # a field that is not of its type
+        except Exception as error:  # a field of the wrong type
             raise failure(PLANNER_GROUP, name, f"returned no valid {type(outcome).__name__}", error) from error
 
     return plan
 
 
 def _restated_refusal(name: str, no_plan: NoPlan) -> NoPlan:
-    """Return the refusal as values of its types."""
+    """Return the refusal with values of the right types."""
     location = None if no_plan.location is None else int(no_plan.location)
     joint = None if no_plan.joint is None else Reason(no_plan.joint)
     return NoPlan(name, Infeasibility(no_plan.infeasibility), location, joint)
 
 
 def _restated_plan(problem: Problem, name: str, plan: Plan) -> Plan:
-    """Return the plan with what is not for the planner to say, in arrays that nobody else can change."""
+    """Return the plan with the fields that a planner does not set, and with read-only arrays."""
     fault = plan_fault(problem, plan)
     if fault is not None:
         raise PlugInError(f"planner {name!r}: returned no valid Plan: {fault}")

@@ -8,10 +8,10 @@ from planner.planning.arm_planning import obeying_the_arm
 from planner.planning.dijkstra import dijkstra
 from planner.planning.dynamic_programming import dynamic_programming
 from planner.planning.local_maxima import local_maxima
-from planner.planning.plan import Planner
 from planner.planning.ray_shooting import guided_ray_shooting, ray_shooting
 from planner.planning.receding import receding
 from planner.planning.rotate_when_blocked import rotate_when_blocked
+from planner.plans.plan import Planner
 
 PLANNERS: Mapping[str, Planner] = MappingProxyType(
     dict(

@@ -1,4 +1,4 @@
-"""Algorithm 2, "ray shooting": at each step, look ahead along rays of constant acceleration and take the cheapest."""
+"""Algorithm 2, "ray shooting": at each step, evaluate rays of constant acceleration and choose the cheapest."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -10,54 +10,60 @@ from planner.defaults import GUIDED_RAY_SHOOTING, RAY_SHOOTING
 from planner.errors import PlannerError
 from planner.kernel import kernel
 from planner.map.config_map import column_value
-from planner.planning.cost_to_go import CostToGo, cost_from_any_speed, cost_to_go
-from planner.planning.crossing import step_is_allowed
-from planner.planning.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
-from planner.planning.problem import Problem, Terms
 from planner.planning.rotate_when_blocked import nearest_allowed_angle
-from planner.planning.state_grid import Grid, default_grid
+from planner.plans.crossing import step_is_allowed
+from planner.plans.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
+from planner.plans.problem import Problem, Terms
+from planner.search.cost_to_go import CostToGo, cost_from_any_speed, cost_to_go
+from planner.search.state_grid import Grid, default_grid
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import limited_acceleration, next_angle, next_speed
 
 
 class Rays(NamedTuple):
-    """n_a and p of the paper: how many rays, and how many columns each looks ahead (cut at the last column)."""
+    """n_a and p of the paper: the number of rays, and of columns that each looks ahead (cut at the last column)."""
 
     rays: int = 21
     horizon: int = 30
 
 
-# What lies behind the horizon is known then, and a ray is straight where the best motion is not: it should be short.
+# The cost beyond the horizon is known in this variant. A ray is straight while the best motion is not, so it should be
+# short.
 GUIDED_RAYS = Rays(horizon=2)
 
 
 class RayError(PlannerError):
-    """A set of rays that cannot be shot."""
+    """An invalid set of rays."""
 
 
 def ray_accelerations(count: int, acceleration_limit_deg_s2: float) -> FloatArray:
-    """Return the paper's non-uniform set A_i = a_max sign(s) s^2, ordered from 0 outwards so that ties go to the least.
+    """Return the paper's non-uniform set A_i = a_max sign(s) s^2, ordered from 0 outward.
+
+    So of equal costs the smallest acceleration is chosen.
 
     Raises:
         RayError: the count is not odd, so that 0 would be missing, or below 3.
     """
     if count < 3 or count % 2 == 0:
-        raise RayError(f"the number of rays is {count}; allowed is any odd number from 3 on")
+        raise RayError(f"the number of rays is {count}; allowed: any odd number from 3 up")
     half = (count - 1) // 2
     positive = acceleration_limit_deg_s2 * (np.arange(1, half + 1) / half) ** 2
     return np.concatenate(([0.0], np.column_stack((positive, -positive)).ravel()))
 
 
 def ray_shooting(problem: Problem, rays: Rays | None = None) -> Outcome:
-    """Return the plan of Algorithm 2: real-time and suboptimal, with a pause where all rays were misled.
+    """Return the plan of Algorithm 2: real-time and suboptimal, with a pause where all rays failed.
 
-    A free start is at rest at the brightest angle of the first location.
+    A free start is at rest at the angle with the maximum value of the first location.
     """
     return _shoot(problem, rays or Rays(), RAY_SHOOTING, no_cost_to_go)
 
 
 def guided_ray_shooting(problem: Problem, rays: Rays | None = None) -> Outcome:
-    """Return the plan of ray shooting whose rays end in the cost-to-go, so that they see beyond their horizon."""
+    """Return the plan of ray shooting with the cost-to-go at the ends of the rays.
+
+    So the rays account for the path beyond their horizon.
+    """
     return _shoot(
         problem, rays or GUIDED_RAYS, GUIDED_RAY_SHOOTING, lambda asked: cost_to_go(asked, default_grid(asked))
     )
@@ -66,7 +72,7 @@ def guided_ray_shooting(problem: Problem, rays: Rays | None = None) -> Outcome:
 def _shoot(problem: Problem, rays: Rays, name: str, terminal: Callable[[Problem], CostToGo]) -> Outcome:
     accelerations = ray_accelerations(rays.rays, problem.limits.acceleration_deg_s2)
     if rays.horizon < 1:
-        raise RayError(f"the horizon is {rays.horizon} columns; allowed is 1 or more")
+        raise RayError(f"the horizon is {rays.horizon} columns; allowed: 1 or more")
     no_plan = obvious_infeasibility(problem, name)
     if no_plan is not None:
         return no_plan
@@ -122,7 +128,7 @@ def cheapest_ray(
     angle_deg: float,
     speed_deg_s: float,
 ) -> int:
-    """Return the index of the ray from this state that costs least; the first of equal ones."""
+    """Return the index of the cheapest ray from this state; the first of equal ones."""
     last = min(column + horizon, len(terms.values) - 1)
     best, least = 0, np.inf
     for i in range(len(accelerations)):
@@ -143,11 +149,11 @@ def ray_cost(
     speed_deg_s: float,
     bound: float,
 ) -> float:
-    """Return what `evalpath` returns: the cost of a ray from column + 1 to `last`, both included.
+    """Return the result of `evalpath`: the cost of a ray from column + 1 to `last`, including both.
 
-    Once it leaves the allowed region, at a column or between two, each remaining step costs C_pen: those to `last`, or
-    to the end of the map where a cost-to-go accounts for them. The speed saturates at its limit. No term is negative,
-    so a ray that already costs `bound` is not followed further.
+    Once it leaves the allowed region, at a column or between two, each remaining step costs C_pen: the steps to `last`,
+    or to the end of the map if a cost-to-go accounts for them. The speed saturates at its limit. No term is negative,
+    so a ray whose cost has reached `bound` is not followed further.
     """
     cost = 0.0
     for k in range(column, last):
@@ -169,6 +175,6 @@ def ray_cost(
 
 @kernel
 def _terminal_cost(terms: Terms, to_go: CostToGo, column: int, angle_deg: float, speed_deg_s: float) -> float:
-    """Return the cost-to-go; where there is no way on, C_pen for each column left."""
+    """Return the cost-to-go; if there is no continuation, C_pen for each remaining column."""
     cost = to_go.unit * cost_from_any_speed(to_go.costs, to_go.grid, column, speed_deg_s, angle_deg)
     return min(cost, terms.pause_cost * (len(to_go.costs) - 1 - column))

@@ -1,9 +1,10 @@
-"""The receding form: plan anew at each step, over the columns of the map that are in view.
+"""The receding horizon planner: plan again at each step, over the columns of the map in view.
 
-For a path that becomes known as it is scanned. Each step solves the cost-to-go over the columns in view, on a coarser
-grid than the default planner's, and carries out the first step of the best motion. What lies behind the view costs
-nothing. Where the columns in view cannot be crossed the scan must pause; pauses are priced above any motion in view, so
-there are as few as can be, and each ends at the angle from which the way on is best (Algorithm 1 takes the nearest).
+For a path that becomes known during the scan. Each step solves the cost-to-go over the columns in view, on a coarser
+grid than the default planner's. Then it executes the first step of the best motion. Columns beyond the view cost
+nothing. If the columns in view cannot be crossed, the scan must pause. A pause costs more than any motion in view, so
+the number of pauses is minimum. Each pause ends at the angle with the best continuation (Algorithm 1 uses the nearest
+one).
 """
 
 from typing import NamedTuple
@@ -15,35 +16,35 @@ from planner.defaults import RECEDING
 from planner.errors import PlannerError
 from planner.kernel import kernel
 from planner.map.config_map import column_value
-from planner.planning.backward_step import BackwardStep, prepare_backward_step, step_back
-from planner.planning.cost_to_go import cost_from_any_speed, lay_out_columns
-from planner.planning.crossing import RunArray, step_is_allowed
-from planner.planning.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
-from planner.planning.problem import Problem, Terms
-from planner.planning.state_grid import Grid, default_grid
+from planner.plans.crossing import RunArray, step_is_allowed
+from planner.plans.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
+from planner.plans.problem import Problem, Terms
+from planner.search.backward_step import BackwardStep, prepare_backward_step, step_back
+from planner.search.cost_to_go import cost_from_any_speed, lay_out_columns
+from planner.search.state_grid import Grid, default_grid
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import next_angle, next_speed
 
-# With 50 columns of 100 angles in view a step takes 0.4 ms; with the fast grid 0.15 ms, at a few per cent more cost.
+# With 50 columns of 100 angles in view a step takes 0.4 ms; with the fast grid 0.15 ms, at a few percent more cost.
 SPEED_COUNT = 31
 FAST_SPEED_COUNT = 13
 
-# Accelerations tried from the present state, over the whole range between the limits.
+# Number of accelerations tried from the present state, over the whole range between the limits.
 TRIALS = 41
 
 
 class HorizonError(PlannerError):
-    """A view that holds no column."""
+    """A view without a column."""
 
 
 class OnlineStep(NamedTuple):
-    """What stays the same from one online step to the next.
+    """Constants of all online steps.
 
     Attributes:
-        grid: where the cost-to-go is sampled.
+        grid: sampling points of the cost-to-go.
         unit: cost of one unit of it.
         backward: its backward step.
-        layers: (2, n_speeds, n_angles) room for the cost-to-go of two columns.
+        layers: (2, n_speeds, n_angles) work arrays for the cost-to-go of two columns.
     """
 
     grid: Grid
@@ -53,17 +54,18 @@ class OnlineStep(NamedTuple):
 
 
 def receding(problem: Problem, columns_in_view: int = 50, speed_count: int = SPEED_COUNT) -> Outcome:
-    """Return the plan that results when at each step only the next `columns_in_view` columns are known.
+    """Return the plan that results if only the next `columns_in_view` columns are known at each step.
 
-    A free start is at rest at the brightest angle of the first location.
+    A free start is at rest at the angle with the maximum value of the first location.
 
     Args:
-        problem: what is to be crossed.
-        columns_in_view: how far each step looks ahead; cut at the last column.
-        speed_count: speeds of the cost-to-go, about; the time of a step grows with it, and its quality.
+        problem: the problem.
+        columns_in_view: number of columns that each step looks ahead; cut at the last column.
+        speed_count: approximate number of speeds of the cost-to-go; the time of a step and its quality increase with
+            it.
     """
     if columns_in_view < 1:
-        raise HorizonError(f"the view is {columns_in_view} columns; allowed is 1 or more")
+        raise HorizonError(f"the view is {columns_in_view} columns; allowed: 1 or more")
     no_plan = obvious_infeasibility(problem, RECEDING)
     if no_plan is not None:
         return no_plan
@@ -79,9 +81,16 @@ def receding(problem: Problem, columns_in_view: int = 50, speed_count: int = SPE
     return make_plan(problem, RECEDING, angles, speeds, accelerations, pauses)
 
 
-def prepare_online_step(problem: Problem, speed_count: int = SPEED_COUNT) -> OnlineStep:
-    """Return what `online_step` needs, laid out once for a map's size, the limits and the weights."""
-    jump_count = 5 if speed_count <= FAST_SPEED_COUNT else 15
+def prepare_online_step(problem: Problem, speed_count: int = SPEED_COUNT, jump_count: int | None = None) -> OnlineStep:
+    """Return the data for `online_step`, prepared once for a map's size, the limits and the weights.
+
+    Args:
+        problem: the map's size, limits and weights.
+        speed_count: approximate number of speeds of the cost-to-go.
+        jump_count: number of changes of speed in a step; None: the default for the number of speeds.
+    """
+    if jump_count is None:
+        jump_count = 5 if speed_count <= FAST_SPEED_COUNT else 15
     grid = default_grid(problem, refinement=1, speed_count=speed_count, jump_count=jump_count, least_reach=2)
     unit = problem.greatest_step_cost
     backward = prepare_backward_step(problem.terms, grid, unit)
@@ -121,11 +130,11 @@ def online_step(
     angle_deg: float,
     speed_deg_s: float,
 ) -> tuple[float, float, float]:
-    """Return the next angle and speed and the acceleration that leads there; NaN for the latter where the scan pauses.
+    """Return the next angle and speed and the acceleration of the step; NaN for the latter if the scan pauses.
 
     Args:
-        terms: the problem; nothing of its map behind `last` is looked at.
-        online: from `prepare_online_step`; its room is overwritten.
+        terms: the problem; its map beyond `last` is not read.
+        online: from `prepare_online_step`; its work arrays are overwritten.
         node_cost: per column, from `lay_out_columns`.
         sweep: per step, from `lay_out_columns`.
         column: the present column.
@@ -146,7 +155,7 @@ def online_step(
 
 @kernel
 def look_ahead(online: OnlineStep, node_cost: CostArray, sweep: RunArray, column: int, last: int) -> None:
-    """Leave the cost-to-go of column + 1, over the columns up to `last`, in the layer of that column."""
+    """Compute the cost-to-go of column + 1, over the columns up to `last`, into the layer of that column."""
     layers, pause_price = online.layers, float(last - column)
     layers[last % 2] = 0.0
     for k in range(last - 1, column, -1):
@@ -158,7 +167,7 @@ def look_ahead(online: OnlineStep, node_cost: CostArray, sweep: RunArray, column
 def _best_acceleration(
     terms: Terms, online: OnlineStep, node_cost: CostArray, column: int, last: int, angle_deg: float, speed_deg_s: float
 ) -> float:
-    """Return the first acceleration of the best motion from a state; NaN where it is better, or necessary, to pause."""
+    """Return the first acceleration of the best motion from a state; NaN if a pause is better or necessary."""
     after_pause = costs_at_rest(online, node_cost, column).min()
     best, least = np.nan, after_pause + (last - column) * online.unit
     for trial in range(TRIALS):
@@ -171,14 +180,14 @@ def _best_acceleration(
 
 @kernel
 def _best_angle_after_pause(online: OnlineStep, node_cost: CostArray, column: int, angle_deg: float) -> float:
-    """Return the angle of the next column, reached by the shorter way round, from which the way on costs least."""
+    """Return the angle of the next column with the minimum cost to continue, reached in the shorter direction."""
     target_deg = costs_at_rest(online, node_cost, column).argmin() * 360.0 / online.grid.angle_count
     return float(target_deg - 360.0 * np.round((target_deg - angle_deg) / 360.0))
 
 
 @kernel
 def costs_at_rest(online: OnlineStep, node_cost: CostArray, column: int) -> FloatArray:
-    """Return, per angle, what it costs to be at rest there in the next column and to go on."""
+    """Return, per angle, the cost of being at rest there in the next column and continuing."""
     costs: FloatArray = (node_cost[column + 1] + online.layers[(column + 1) % 2, online.grid.half_count]).astype(
         np.float64
     )
@@ -189,7 +198,7 @@ def costs_at_rest(online: OnlineStep, node_cost: CostArray, column: int) -> Floa
 def trial_cost(
     terms: Terms, online: OnlineStep, column: int, angle_deg: float, speed_deg_s: float, acceleration_deg_s2: float
 ) -> float:
-    """Return what one step and the way on from its end cost; infinite where there is none."""
+    """Return the cost of one step and the continuation from its end; infinity if there is none."""
     speed = next_speed(speed_deg_s, acceleration_deg_s2, terms.step_s)
     if abs(speed) > terms.speed_limit_deg_s:
         return np.inf

@@ -1,18 +1,18 @@
-"""Algorithm 1, "rotate when out of range": stand still; where the next location is forbidden, pause and turn."""
+"""Algorithm 1, "rotate when out of range": stand still; if the next location is forbidden, pause and turn."""
 
 import numpy as np
 
 from planner.defaults import ROTATE_WHEN_BLOCKED
 from planner.kernel import kernel
 from planner.map.config_map import column_value, sample_at_or_above, sample_at_or_below
-from planner.planning.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
-from planner.planning.problem import Problem, Terms
+from planner.plans.plan import Outcome, Pause, greedy_start, make_plan, obvious_infeasibility
+from planner.plans.problem import Problem, Terms
 
 
 def rotate_when_blocked(problem: Problem) -> Outcome:
-    """Return the plan of Algorithm 1; every turn of the table pauses the scan, and the table never moves otherwise.
+    """Return the plan of Algorithm 1. Every turn of the table pauses the scan; otherwise the table does not move.
 
-    A free start is at rest at the brightest angle of the first location; a start in motion pauses at once.
+    A free start is at rest at the angle with the maximum value of the first location; a start in motion pauses at once.
     """
     no_plan = obvious_infeasibility(problem, ROTATE_WHEN_BLOCKED)
     if no_plan is not None:
@@ -30,13 +30,13 @@ def rotate_when_blocked(problem: Problem) -> Outcome:
 
 @kernel
 def nearest_allowed_angle(terms: Terms, location: int, angle_deg: float) -> float:
-    """Return the allowed angle of a location that is nearest to an angle, within half a turn each way.
+    """Return the allowed angle of a location that is nearest to an angle, within half a turn in each direction.
 
     The paper steps away from the angle by the map's own step. Here the steps fall on the map's samples, so that any
-    allowed angle that exists is found. As in the paper, upwards is tried first.
+    existing allowed angle is found. As in the paper, upward is tried first.
 
     Returns:
-        The (unwrapped) angle; NaN where the whole location is forbidden.
+        The (unwrapped) angle; NaN if the whole location is forbidden.
     """
     if column_value(terms.values, terms.epsilon, location, angle_deg) > terms.epsilon:
         return angle_deg

@@ -1,4 +1,4 @@
-"""From a scan to the best plan: its maps, a problem for each arm configuration, and the planner's answers."""
+"""From a scan to the best plan: its maps, a problem for each arm configuration, and the results of the planner."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ from planner.kinematics.configuration import Configuration
 from planner.map.map_builder import build_maps, is_compiled
 from planner.map.map_file import MAP_FILE, save_maps
 from planner.map.map_problem import map_problem
-from planner.planning.arm_motion import ArmMotion, arm_motion
 from planner.planning.best_configuration import Comparison, best_configuration
 from planner.planning.compiling import compiling_beside
-from planner.planning.plan import Outcome, Plan, Planner
-from planner.planning.plan_file import PLAN_FILE, plan_document, save_plan
-from planner.planning.problem import Problem
 from planner.planning.scan_problem import scan_problem
-from planner.planning.verification import Verification, verify
+from planner.plans.arm_motion import ArmMotion, arm_motion
+from planner.plans.plan import Outcome, Plan, Planner
+from planner.plans.plan_file import PLAN_FILE, plan_document, save_plan
+from planner.plans.problem import Problem
+from planner.plans.verification import Verification, verify
 from protocol.progress import ProgressOf
 
 
@@ -26,11 +26,11 @@ class PlannedScan:
     """A scan with the plan of its best arm configuration.
 
     Attributes:
-        scan: What is scanned.
-        problem: Map, limits and weights of that configuration.
-        plan: The table's motion.
-        arm: The arm's motion that belongs to it.
-        outcomes: What the planner answered in each configuration, by name.
+        scan: the scan.
+        problem: map, limits and weights of that configuration.
+        plan: the motion of the table.
+        arm: the matching motion of the arm.
+        outcomes: the result of the planner in each configuration, by name.
     """
 
     scan: Scan
@@ -41,19 +41,19 @@ class PlannedScan:
 
     @property
     def verification(self) -> Verification:
-        """What the execution of the plan would meet."""
+        """The result of a check of the plan before its execution."""
         return verify(self.problem, self.plan)
 
     @property
     def is_executable(self) -> bool:
-        """Whether the table can carry the plan out, nothing forbidden is met, and the arm can follow."""
+        """Whether the table can execute the plan, nothing forbidden is touched, and the arm can follow."""
         return self.verification.is_executable and self.arm.step is None
 
     def save(self, folder: str | Path) -> Path:
-        """Write `plan.json` and `map.npz` into a folder, and return the first: what `python -m planner run` takes.
+        """Write `plan.json` and `map.npz` to a folder. Return the first, which is the input of `python -m planner run`.
 
         Raises:
-            OSError: They cannot be written.
+            OSError: the files cannot be written.
         """
         plan_file = Path(folder) / PLAN_FILE
         plan_file.parent.mkdir(parents=True, exist_ok=True)
@@ -63,7 +63,7 @@ class PlannedScan:
 
 
 class ScanPlans(NamedTuple):
-    """What was planned for a scan, by configuration."""
+    """The planning results of a scan, by configuration."""
 
     scan: Scan
     problems: Mapping[str, Problem]
@@ -71,7 +71,7 @@ class ScanPlans(NamedTuple):
 
     @property
     def best(self) -> PlannedScan | None:
-        """The best plan with its problem and the motion of the arm; None where there is no plan."""
+        """The best plan with its problem and the motion of the arm; None if there is no plan."""
         if self.comparison.best is None:
             return None
         problem, plan = self.problems[self.comparison.best], self.comparison.outcomes[self.comparison.best]
@@ -92,21 +92,20 @@ def plan_scan(
     """Plan a scan in one arm configuration, or in all of them.
 
     Args:
-        scan: what is scanned.
+        scan: the scan.
         configuration: its name, or `best` to compare all.
         angle_count: table angles of a map.
-        planner: who plans.
-        progress: gives the progress of a kind of work.
+        planner: the planner.
+        progress: gives the progress function for a kind of work.
         start_angle_deg: the table's angle at the first location, if it is given.
-        compiled: the name of the planner, if its machine code may be compiled beside the maps.
+        compiled: name of the planner, if its machine code may be compiled in parallel with the maps.
 
     Raises:
-        ConfigurationNameError: The name is none.
+        ConfigurationNameError: the name does not exist.
     """
     asked = list(Configuration) if configuration == "best" else [Configuration.parse(configuration)]
-    with compiling_beside(compiled, progress) as wait:
+    with compiling_beside(compiled, progress):
         problem = map_problem(scan, progress("distance field"))
         maps = build_maps(problem, asked, angle_count, progress("map" if is_compiled() else "map (compiling, once)"))
-        wait()
-    problems = {each.label: scan_problem(scan, map_, start_angle_deg) for each, map_ in maps.items()}
-    return ScanPlans(scan, problems, best_configuration(problems, planner, progress("plan")))
+        problems = {each.label: scan_problem(scan, map_, start_angle_deg) for each, map_ in maps.items()}
+        return ScanPlans(scan, problems, best_configuration(problems, planner, progress("plan")))

@@ -3,8 +3,8 @@
 from planner.cell.scan import Scan
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap
-from planner.planning.arm_on_path import arm_on_path
-from planner.planning.problem import Problem
+from planner.plans.arm_on_path import arm_on_path
+from planner.plans.problem import Problem
 
 
 def scan_problem(scan: Scan, configuration_map: ConfigurationMap, start_angle_deg: float | None = None) -> Problem:

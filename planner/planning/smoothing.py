@@ -1,11 +1,11 @@
 """Post-processing that removes acceleration peaks from a plan without new risks or costs.
 
 A plan is changed by waves (+d, -2d, +d) on the accelerations of three neighboring blocks of steps. Under Eq. (3) and
-(4) such a wave ends with the angle and the speed that were there before, so all that follows stays as it is and what
-precedes was never touched. A wave is accepted only if
+(4), such a wave ends with the former angle and speed, so the motion before and after it does not change. A wave is
+accepted only if
 
-- the greatest acceleration under it falls, or stays while the sum of fourth powers falls (the peaks get lower),
-- Eq. (7) does not rise,
+- the maximum acceleration under it decreases, or stays while the sum of fourth powers decreases (lower peaks),
+- Eq. (7) does not increase,
 - the limits hold and each step under it stays allowed.
 """
 
@@ -16,19 +16,19 @@ import numpy as np
 from planner.arrays import BoolArray, FloatArray, IndexArray
 from planner.kernel import kernel
 from planner.map.config_map import column_value
-from planner.planning.crossing import step_is_allowed
-from planner.planning.plan import Plan, make_plan
-from planner.planning.problem import Problem, Terms
+from planner.plans.crossing import step_is_allowed
+from planner.plans.plan import Plan, make_plan
+from planner.plans.problem import Problem, Terms
 from planner.table.cost import acceleration_cost, speed_cost, value_cost
 from planner.table.motion import next_angle, next_speed, roll_out
 
-# Lengths of a wave's blocks in steps: the short ones take off peaks, the long ones move curves.
+# Lengths of a wave's blocks in steps: short ones reduce peaks, long ones shift curves.
 BLOCK_LENGTHS = (1, 2, 3, 5, 8)
 SWEEPS = 60
 
 
 def smooth(problem: Problem, plan: Plan) -> Plan:
-    """Return the plan with lower acceleration peaks: never into a forbidden region, never at a higher cost."""
+    """Return the plan with lower acceleration peaks, never in a forbidden region and never at a higher cost."""
     fixed = np.zeros(problem.step_count, dtype=np.bool_)
     fixed[[pause.step for pause in plan.pauses]] = True
     accelerations, angles, speeds = (
@@ -55,7 +55,7 @@ def _sweep(
     speeds: FloatArray,
     accelerations: FloatArray,
 ) -> int:
-    """Try one wave of each length at each place; change the motion in place and return how many were accepted."""
+    """Try one wave of each length at each place. Change the motion in place and return the number of accepted waves."""
     accepted = 0
     for length in blocks:
         for first in range(len(accelerations) - 3 * length + 1):
@@ -75,7 +75,7 @@ def _sweep(
 
 @kernel
 def _flattening(accelerations: FloatArray, length: int) -> float:
-    """Return the size of the wave that leaves the least sum of squares."""
+    """Return the size of the wave with the minimum sum of squares."""
     first = accelerations[:length].sum()
     middle = accelerations[length : 2 * length].sum()
     last = accelerations[2 * length :].sum()
@@ -92,7 +92,7 @@ def _try_wave(
     speeds: FloatArray,
     accelerations: FloatArray,
 ) -> bool:
-    """Carry the wave out if it is an improvement."""
+    """Apply the wave if it is an improvement."""
     count = 3 * length
     old = accelerations[first : first + count]
     new = old.copy()

@@ -1,1 +1,1 @@
-"""The scan itself: the probe, latched angles, calibration, the cloud in one frame, and its error budget."""
+"""The scan itself: probe, latched angles, calibration, the cloud in one frame, and its error budget."""

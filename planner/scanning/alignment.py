@@ -1,7 +1,7 @@
-"""Put profiles into the workpiece's frame, from the robot's pose and the table's angle latched on their trigger.
+"""Transform profiles into the workpiece's frame, from the robot's pose and the table's angle latched at their trigger.
 
-T_WS = inv(T_TW) Rz(-theta) inv(T_BT) T_BF T_FS: the robot carries the probe (S) on its flange (F), the table (T) turns
-the workpiece (W), and both stand in the robot's base (B).
+T_WS = inv(T_TW) Rz(-theta) inv(T_BT) T_BF T_FS. The robot carries the probe (S) on its flange (F), and the table (T)
+turns the workpiece (W). Both are in the robot's base frame (B).
 """
 
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from planner.geometry.transforms import rigid_inverse, rotations_z
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What has to be known of the cell to align a profile; each is a rigid `(4, 4)` in mm.
+    """The placements for the alignment of a profile; each is a rigid `(4, 4)` in mm.
 
     Attributes:
-        T_FS: The probe on the flange.
-        T_BT: The table in the robot's base: its z axis is the axis of rotation.
-        T_TW: The workpiece on the table, at table angle 0.
+        T_FS: pose of the probe on the flange.
+        T_BT: pose of the table in the robot's base: its z axis is the axis of rotation.
+        T_TW: pose of the workpiece on the table, at table angle 0.
     """
 
     T_FS: FloatArray
@@ -29,7 +29,7 @@ class Calibration:
 
     @classmethod
     def of(cls, cell: Cell) -> "Calibration":
-        """Return the placements that the cell is described with."""
+        """Return the placements of the cell's description."""
         return cls(cell.T_FS, cell.T_BT, cell.T_TW)
 
 
@@ -37,20 +37,20 @@ def probe_poses(calibration: Calibration, T_BF: FloatArray, angles_deg: FloatArr
     """Return the probe in the workpiece's frame, T_WS `(n, 4, 4)`.
 
     Args:
-        calibration: The placements.
-        T_BF: Flange poses latched, `(n, 4, 4)`.
-        angles_deg: Table angles latched on the same triggers, `(n,)`.
+        calibration: the placements.
+        T_BF: latched flange poses, `(n, 4, 4)`.
+        angles_deg: table angles latched at the same triggers, `(n,)`.
     """
     T_WB = rigid_inverse(calibration.T_TW) @ rotations_z(-angles_deg) @ rigid_inverse(calibration.T_BT)
     return np.asarray(T_WB @ T_BF @ calibration.T_FS)
 
 
 def aligned(T_WS: FloatArray, profiles: IndexArray, points_S: FloatArray) -> FloatArray:
-    """Return points `(m, 3)` in frame W, each taken from frame S by the pose of its profile.
+    """Return points `(m, 3)` in frame W, each transformed from frame S by the pose of its profile.
 
     Args:
         T_WS: `(n, 4, 4)`.
-        profiles: `(m,)` which of them belongs to each point.
+        profiles: `(m,)` pose index of each point.
         points_S: `(m, 3)` in mm.
     """
     turned = np.einsum("ijk,ik->ij", T_WS[profiles, :3, :3], points_S)

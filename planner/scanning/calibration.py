@@ -1,6 +1,6 @@
-"""Find the table's axis from a reference sphere that turns with the table: its center moves on a circle.
+"""Find the table's axis with a reference sphere that turns with the table: its center moves on a circle.
 
-A fit that is not plausible, or too uncertain for the scan, is refused with the figure that says so.
+A fit that is not plausible, or too uncertain for the scan, is refused; the message states the figure.
 """
 
 from dataclasses import dataclass
@@ -17,28 +17,28 @@ from planner.geometry.transforms import rotations_z
 from planner.scanning.score_tests import FALSE_ALARMS, Change, NormalEquations, find_change
 
 GREATEST_POINT_ERROR_MM = 0.1
-"""How far (1 sigma) the uncertainty of a calibration may move a point of the scan: four times the probe's noise."""
-# Three determine an axis, and one more shows whether it is one. Angles nearer than this are the same place.
+"""Maximum displacement (1 sigma) of a scan point by the uncertainty of a calibration: four times the probe's noise."""
+# Three points determine an axis, and one more checks it. Angles closer than this are the same place.
 _FEWEST_PLACES = 4
 _SAME_PLACE_DEG = 10.0
-# The noise of a sphere's center that is assumed at least: few residuals can agree by chance.
+# Minimum assumed noise of a sphere's center: few residuals can agree by chance.
 _LEAST_NOISE_MM = 0.002
-# Two tests share the allowed false alarms: all residuals together, and their order.
+# Two tests share the allowed false alarms: of all residuals together, and of their order.
 _ALARMS_EACH = FALSE_ALARMS / 2.0
-# The unknowns of the fit: tilt (rad) and shift (mm) of the axis, and where the sphere sits on the table (mm).
+# The unknowns of the fit: tilt (rad) and shift (mm) of the axis, and position of the sphere on the table (mm).
 _AXIS, _SEAT = slice(0, 4), slice(4, 7)
-# A circle that short or that small does not say where its axis is.
+# A shorter arc or a smaller circle does not determine its axis.
 _SHORTEST_ARC_DEG = 90.0
 _SMALLEST_CIRCLE_MM = 10.0
 _GREATEST_AXIS_ERROR_DEG = 10.0
 
 
 class CalibrationError(PlannerError):
-    """Measurements that do not determine a placement, or contradict each other."""
+    """Measurements that do not determine a placement, or that are inconsistent."""
 
 
 class PartSize(NamedTuple):
-    """The cylinder about the table's axis that holds the part, from the table's top upwards, in mm."""
+    """The cylinder around the table's axis that contains the part, from the table's top upward, in mm."""
 
     radius_mm: float = 150.0
     height_mm: float = 200.0
@@ -46,15 +46,16 @@ class PartSize(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class AxisCalibration:
-    """Where the table's axis is.
+    """The axis of the table.
 
     Attributes:
-        T_BT: The table in the base, `(4, 4)`: z along the axis; origin and x as near to the nominal ones as z allows.
-        residuals_mm: `(n,)` distance of each sphere center from where the fit has it.
-        rms_mm: Their root mean square.
-        uncertainty_mm: Expected distance (root mean square) of the axis from the true one, at the table's top.
-        uncertainty_deg: Expected angle (root mean square) between the two.
-        point_error_mm: Root mean square of how far both together move a point at the worst place of the part.
+        T_BT: pose of the table in the base, `(4, 4)`: z along the axis; origin and x as near to the nominal ones as z
+            allows.
+        residuals_mm: `(n,)` distance of each sphere center from the fitted position.
+        rms_mm: their root mean square.
+        uncertainty_mm: expected distance (root mean square) of the axis from the true one, at the table's top.
+        uncertainty_deg: expected angle (root mean square) between the two.
+        point_error_mm: root mean square of the displacement by both together, at the worst point of the part.
     """
 
     T_BT: FloatArray
@@ -75,24 +76,25 @@ def calibrate_table_axis(
 ) -> AxisCalibration:
     """Return the table's axis from the centers of a sphere that turns with it.
 
-    A point on the table is at a + cos(theta) u + sin(theta) v, with u and v at right angles and of equal length. The
-    linear fit without those two conditions gives the start for the fit with them. What the centers cannot tell, where
-    along the axis the table's top is and which direction angle 0 has, is taken from the nominal placement.
+    A point on the table is at a + cos(theta) u + sin(theta) v, with u and v perpendicular and of equal length. The
+    linear fit without these two conditions gives the start for the fit with them. The centers do not determine the
+    position of the table's top along the axis, and the direction of angle 0. Both are taken from the nominal placement.
 
-    The uncertainty follows from the covariance of the fit. It is refused where it would move a point of the part by
-    more than `GREATEST_POINT_ERROR_MM`. The residuals are tested for a sphere that moved on the table.
+    The uncertainty follows from the covariance of the fit. The fit is refused if a point of the part would move by more
+    than `GREATEST_POINT_ERROR_MM`. The residuals are tested for a sphere that moved on the table.
 
     Args:
-        centers_B: Centers in the base, `(n, 3)` in mm, in the order in which they were taken.
-        angles_deg: The table's angle at each, `(n,)`.
-        nominal_T_BT: About where the table is.
-        greatest_rms_mm: A worse fit is refused.
-        noise_mm: Standard deviation of each coordinate of a center; estimated from the residuals where left out, and
-            then at least 0.002 mm.
-        part: What will be scanned.
+        centers_B: centers in the base, `(n, 3)` in mm, in the order of the measurements.
+        angles_deg: table angle of each, `(n,)`.
+        nominal_T_BT: approximate pose of the table.
+        greatest_rms_mm: maximum residual of an accepted fit.
+        noise_mm: standard deviation of each coordinate of a center. By default it is estimated from the residuals, with
+            a minimum of 0.002 mm.
+        part: the part of the scan.
 
     Raises:
-        CalibrationError: The centers do not determine the axis well enough, or do not lie as on a turning table.
+        CalibrationError: the centers do not determine the axis with sufficient accuracy, or are not on a circle around
+            it.
     """
     _check_angles(centers_B, angles_deg)
     if noise_mm is not None:
@@ -111,7 +113,7 @@ def calibrate_table_axis(
     if rms_mm > greatest_rms_mm:
         raise CalibrationError(
             f"the sphere's centers lie {rms_mm:.3f} mm (rms) off a turning table's circle; allowed are"
-            f" {greatest_rms_mm:g} mm: were the sphere or the table's foot loose, or the angles not those of the views?"
+            f" {greatest_rms_mm:g} mm; check that sphere and table are fixed, and that the angles belong to the views"
         )
     freedom = len(fit.fun) - len(fit.x)
     estimated_mm = float(np.sqrt(np.sum(fit.fun**2) / freedom))
@@ -125,7 +127,7 @@ def calibrate_table_axis(
 
 
 def _start(centers_B: FloatArray, angles_deg: FloatArray, nominal_T_BT: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return about where the table is, and where the sphere sits on it, from a linear fit."""
+    """Return the approximate pose of the table, and the position of the sphere on it, from a linear fit."""
     theta = np.radians(angles_deg)
     design = np.column_stack((np.ones_like(theta), np.cos(theta), np.sin(theta)))
     middle, u, v = np.linalg.lstsq(design, centers_B, rcond=None)[0]
@@ -134,7 +136,7 @@ def _start(centers_B: FloatArray, angles_deg: FloatArray, nominal_T_BT: FloatArr
     if radius_mm < _SMALLEST_CIRCLE_MM:
         raise CalibrationError(
             f"the sphere turns on a circle of only {radius_mm:.1f} mm radius;"
-            f" put it at least {_SMALLEST_CIRCLE_MM:g} mm off the table's axis"
+            f" place it at least {_SMALLEST_CIRCLE_MM:g} mm off the table's axis"
         )
     start = _placed_on_axis(nominal_T_BT, middle, axis / np.linalg.norm(axis))
     seats_T = rotations_z(-angles_deg)[:, :3, :3] @ ((centers_B - start[:3, 3]) @ start[:3, :3])[:, :, np.newaxis]
@@ -149,7 +151,7 @@ def _check_residuals(
     groups = np.repeat(np.arange(len(angles_deg)), 3)
     equations = NormalEquations.of(residuals_mm / deviation_mm, jacobian / deviation_mm, groups)
     change = find_change(equations, _SEAT, _ALARMS_EACH, noise_is_known=noise_mm is not None)
-    # What is far below any sphere's noise is rounding, whatever its order.
+    # Values far below the noise of any sphere are rounding, in any order.
     if change is not None and (noise_mm is not None or rms_mm > 0.1 * _LEAST_NOISE_MM):
         raise CalibrationError(
             f"the sphere's centers lie {rms_mm:.3f} mm (rms) off a turning table's circle, and {_what_changed(change)}"
@@ -158,16 +160,16 @@ def _check_residuals(
         ratio = np.sqrt(equations.chi_square / equations.freedom)
         raise CalibrationError(
             f"the sphere's centers lie {rms_mm:.3f} mm (rms) off a turning table's circle, {ratio:.1f} times their"
-            " noise: were the sphere or the table's foot loose, or the angles not those of the views?"
+            " noise; check that sphere and table are fixed, and that the angles belong to the views"
         )
 
 
 def _what_changed(change: Change) -> str:
     if change.kind == "drift":
-        return "the sphere drifts on the table: is it fixed, does the cell still warm up?"
+        return "the sphere drifts on the table; check that it is fixed, and that the cell is warm"
     if change.kind == "step":
-        return f"the sphere is elsewhere from center {change.group + 1} on: did it move on the table?"
-    return f"center {change.group + 1} does not agree with the others: is its angle right?"
+        return f"the position of the sphere changes at center {change.group + 1}; check that it did not move"
+    return f"center {change.group + 1} does not agree with the others; check its angle"
 
 
 def _uncertainty(covariance: FloatArray, part: PartSize) -> tuple[float, float, float]:
@@ -184,8 +186,8 @@ def _uncertainty(covariance: FloatArray, part: PartSize) -> tuple[float, float, 
         raise CalibrationError(
             f"the centers leave the table's axis open by {shift_mm:.2g} mm and {np.degrees(tilt_rad):.2g} deg (1 sigma)"
             f"; a point of a part of {part.radius_mm:g} mm radius and {part.height_mm:g} mm height is then"
-            f" {error_mm:.2g} mm wrong, and allowed are {GREATEST_POINT_ERROR_MM:g} mm: spread the table angles,"
-            " or put the sphere farther off the axis"
+            f" {error_mm:.2g} mm wrong; allowed are {GREATEST_POINT_ERROR_MM:g} mm; spread the table angles,"
+            " or place the sphere farther from the axis"
         )
     return shift_mm, float(np.degrees(tilt_rad)), error_mm
 
@@ -194,7 +196,7 @@ def _check_angles(centers_B: FloatArray, angles_deg: FloatArray) -> None:
     if len(centers_B) != len(angles_deg) or len(angles_deg) < _FEWEST_PLACES:
         raise CalibrationError(
             f"there are {len(centers_B)} sphere centers and {len(angles_deg)} table angles;"
-            f" the axis needs as many of either, and at least {_FEWEST_PLACES}"
+            f" the axis needs equal numbers of both, and at least {_FEWEST_PLACES}"
         )
     if not (np.isfinite(centers_B).all() and np.isfinite(angles_deg).all()):
         raise CalibrationError("a sphere center or a table angle is not a finite number")
@@ -212,15 +214,15 @@ def _check_angles(centers_B: FloatArray, angles_deg: FloatArray) -> None:
 
 
 def check_noise(noise_mm: float) -> None:
-    """Refuse a noise that nothing can be held against."""
+    """Refuse an invalid noise."""
     if not 0.0 < noise_mm < np.inf:
         raise CalibrationError(f"the noise is {noise_mm:g} mm; it must be a finite number above 0")
 
 
 def _distinct_places(angles_deg: FloatArray) -> int:
-    """Return how many of the angles are apart from one another."""
+    """Return the number of distinct angles."""
     turned = np.sort(np.mod(angles_deg, 360.0))
-    # Counting begins after the widest gap, so that no place lies on both sides of 0.
+    # Counting starts after the widest gap, so that no place is on both sides of 0.
     turned = np.roll(turned, -int(np.argmax(np.diff(turned, prepend=turned[-1] - 360.0))))
     ways = np.mod(turned - turned[0], 360.0)
     places, last = 0, -np.inf
@@ -231,7 +233,7 @@ def _distinct_places(angles_deg: FloatArray) -> int:
 
 
 def _shortest_arc_deg(angles_deg: FloatArray) -> float:
-    """Return the shortest arc that holds all the angles."""
+    """Return the shortest arc that contains all the angles."""
     turned = np.sort(np.mod(angles_deg, 360.0))
     return float(360.0 - np.max(np.diff(turned, append=turned[0] + 360.0)))
 
@@ -241,13 +243,13 @@ def _check_axis(T_BT: FloatArray, nominal_T_BT: FloatArray) -> None:
     off_deg = float(np.degrees(np.arccos(cosine)))
     if off_deg > _GREATEST_AXIS_ERROR_DEG:
         raise CalibrationError(
-            f"the axis found is {off_deg:.1f} deg off the nominal one; allowed are {_GREATEST_AXIS_ERROR_DEG:g}:"
-            " does the table count the other way round?"
+            f"the axis found is {off_deg:.1f} deg off the nominal one; allowed are {_GREATEST_AXIS_ERROR_DEG:g};"
+            " check the direction in which the table counts"
         )
 
 
 def _placed_on_axis(nominal_T_BT: FloatArray, point: FloatArray, axis: FloatArray) -> FloatArray:
-    """Return the placement about an axis whose origin and x direction are the nearest to the nominal ones."""
+    """Return the placement with a given axis, whose origin and x direction are nearest to the nominal ones."""
     T = np.eye(4)
     x = nominal_T_BT[:3, 0] - (nominal_T_BT[:3, 0] @ axis) * axis
     T[:3, 2], T[:3, 0] = axis, x / np.linalg.norm(x)
@@ -257,7 +259,7 @@ def _placed_on_axis(nominal_T_BT: FloatArray, point: FloatArray, axis: FloatArra
 
 
 def _tilted(T: FloatArray, tilt_and_shift: FloatArray) -> FloatArray:
-    """Return T moved by two angles (rad) about its x and y, and two lengths (mm) along them."""
+    """Return T rotated by two angles (rad) around its x and y, and shifted by two lengths (mm) along them."""
     moved = np.eye(4)
     moved[:3, :3] = Rotation.from_rotvec((*tilt_and_shift[:2], 0.0)).as_matrix()
     moved[:2, 3] = tilt_and_shift[2:]

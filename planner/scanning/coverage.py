@@ -1,8 +1,9 @@
-"""How much of the surface a scan has seen, and why not the rest.
+"""The share of the surface that a scan measured, and the reasons for the rest.
 
-Points spread evenly over the surface are asked of each profile: does the laser's fan pass over it, and would it be
-measured there? The conditions are the probe's own (`probe.sight`), so the answer is that of the scan, not of the
-cloud's density. A point that was never measured keeps the condition that it came nearest to meeting all of.
+Each profile is tested for points that are spread evenly over the surface: whether the laser's fan passes over the
+point, and whether the probe would measure it. The conditions are those of the probe (`probe.sight`), so the result
+belongs to the scan, not to the density of the cloud. A point that was never measured keeps the last condition that it
+reached.
 """
 
 import numpy as np
@@ -24,7 +25,7 @@ REASONS = {
 
 
 class Coverage:
-    """The surface's sample points, and how far each came to being measured so far.
+    """The sample points of the surface, and the best condition that each has reached.
 
     Attributes:
         points: `(SAMPLES, 3)` in frame W.
@@ -33,13 +34,13 @@ class Coverage:
     """
 
     def __init__(self, mesh: trimesh.Trimesh, caster: RayCaster, probe: LaserProbe, spacing_mm: float) -> None:
-        """Spread the samples over a mesh.
+        """Distribute the samples over a mesh.
 
         Args:
-            mesh: The surface.
-            caster: The same, for rays.
-            probe: The probe.
-            spacing_mm: Profiles nearer to one another than this leave no gap between them.
+            mesh: the surface.
+            caster: the same surface, for ray casting.
+            probe: the probe.
+            spacing_mm: maximum distance of profiles without a gap between them.
         """
         points, triangles = trimesh.sample.sample_surface(mesh, SAMPLES, seed=0)
         self.points: FloatArray = np.asarray(points, dtype=np.float64)
@@ -48,7 +49,7 @@ class Coverage:
         self._caster, self._probe, self._spacing_mm = caster, probe, spacing_mm
 
     def take(self, T_WS: FloatArray) -> None:
-        """Take in profiles from poses `(n, 4, 4)`."""
+        """Add profiles from poses `(n, 4, 4)`."""
         unseen = np.flatnonzero(self.codes != Sight.SEEN)
         if not len(unseen):
             return
@@ -65,7 +66,7 @@ class Coverage:
         np.maximum.at(self.codes, sample, codes)
 
     def _passed_over(self, T_WS: FloatArray, points: FloatArray) -> tuple[IndexArray, IndexArray, FloatArray]:
-        """Return which profiles pass over which points (indices), and at what depth."""
+        """Return the pairs of profiles and points (indices) with a crossing, and its depth."""
         T_SW = rigid_inverse(T_WS)
         across = points @ T_SW[:, 1, :3].T + T_SW[:, 1, 3]  # y in frame S, (m, n)
         place, profile = np.nonzero(np.abs(across) <= 0.5 * self._spacing_mm)
@@ -74,5 +75,5 @@ class Coverage:
         return profile[within], place[within], in_S[within, 2]
 
     def shares(self) -> dict[Sight, float]:
-        """Return the share of the surface in each state; together they are 1."""
+        """Return the share of the surface in each state; their sum is 1."""
         return {code: float(np.mean(self.codes == code)) for code in Sight}

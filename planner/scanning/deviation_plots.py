@@ -1,7 +1,7 @@
-"""The picture of a cloud's deviation: the signed distance from the surface, averaged nearby, with scale and axes.
+"""The plot of a cloud's deviation: the signed distance from the surface, averaged locally, with scale and axes.
 
-A part that is round about an axis is unrolled: its wall over angle and height, and its ends as seen along the axis.
-Any other part is seen from two sides.
+A part that is round around an axis is unrolled: its wall over angle and height, and its ends in the direction of the
+axis. Any other part is shown from two sides.
 """
 
 from typing import Literal, NamedTuple
@@ -23,26 +23,26 @@ from planner.scanning.error_budget import ErrorBudget
 from planner.scanning.part_view import BARE, VIEWS, View
 
 _SIGMA_CELLS = 4.0
-"""Of the Gaussian weights of the average, in cells of a picture."""
+"""Sigma of the Gaussian weights of the average, in cells of a picture."""
 _CELLS = 280
-"""Along the longer side of a picture."""
+"""Number of cells along the longer side of a picture."""
 _ROUND_SHARE, _SIDEWAYS = 0.98, 0.1
-"""A part is round where so much of its area has normals with a share along the circumference of less than that."""
+"""A part is round if this share of its area has normals with a circumferential component below the given one."""
 _END_SLOPE = 0.8
-"""Where the normal has this share along the axis, the surface is an end and not the wall."""
+"""A surface whose normal has this component along the axis is an end and not the wall."""
 _LEAST_SHARE = 0.01
-"""A panel with a smaller share of the points is left out."""
+"""A panel with a smaller share of the points is omitted."""
 _COLORS = mpl.colormaps["RdYlBu_r"]
 
 
 class Panel(NamedTuple):
-    """A picture of deviations: `(rows, columns)` of the lower left corner upwards, NaN where nothing was measured.
+    """A picture of deviations: `(rows, columns)` from the lower left corner upward, NaN without measurements.
 
     Attributes:
-        deviation_um: Averaged deviation.
-        extent: Left, right, bottom and top, in the units of the axes.
-        title: What is seen.
-        labels: Of the axes, to the right and upwards.
+        deviation_um: averaged deviation.
+        extent: left, right, bottom and top, in the units of the axes.
+        title: title of the view.
+        labels: labels of the axes, to the right and upward.
         bare: RGB picture of the part below, or None.
     """
 
@@ -55,7 +55,7 @@ class Panel(NamedTuple):
 
 @styled()
 def deviation_figure(mesh: trimesh.Trimesh, budget: ErrorBudget) -> Figure:
-    """Return the deviation of a cloud from its part: unrolled where that is round, else from two sides."""
+    """Return the deviation of a cloud from its part: unrolled if that is round, else from two sides."""
     points, errors_um = budget.points_W, 1e3 * budget.errors_mm
     axis = axis_of_revolution(mesh)
     panels = _seen(mesh, points, errors_um) if axis is None else unrolled(mesh, axis, points, errors_um)
@@ -73,7 +73,7 @@ def deviation_figure(mesh: trimesh.Trimesh, budget: ErrorBudget) -> Figure:
 
 
 def axis_of_revolution(mesh: trimesh.Trimesh) -> FloatArray | None:
-    """Return the axis `(3,)` through the middle about which a part is round; None where there is none.
+    """Return the axis `(3,)` through the middle around which a part is round; None if there is none.
 
     On a surface of revolution no normal has a component along the circumference.
     """
@@ -92,7 +92,7 @@ def unrolled(mesh: trimesh.Trimesh, axis: FloatArray, points: FloatArray, errors
     """Return the wall of a round part over angle and height, and those of its ends that were measured."""
     surface, faces = trimesh.sample.sample_surface(mesh, 20_000, seed=0)
     slope = mesh.face_normals[faces[cKDTree(surface).query(points)[1]]] @ axis
-    # Angles are counted from x, or from the axis nearest to it that lies across.
+    # Angles are counted from x, or from the nearest axis that is perpendicular.
     x = np.eye(3)[np.argmin(np.abs(axis))]
     x = x - (x @ axis) * axis
     x /= np.linalg.norm(x)
@@ -137,10 +137,10 @@ def smoothed(cells: IndexArray, errors_um: FloatArray, shape: tuple[int, int], *
     """Return the average with Gaussian weights over the cells of a picture; NaN more than two sigmas from all points.
 
     Args:
-        cells: `(n,)` the cell of each point, row by row.
-        errors_um: `(n,)` what is averaged.
-        shape: Rows and columns.
-        is_round: The last column is beside the first one.
+        cells: `(n,)` cell of each point, row by row.
+        errors_um: `(n,)` values to average.
+        shape: rows and columns.
+        is_round: whether the last column is adjacent to the first one.
     """
     mode: tuple[Literal["nearest"], Literal["nearest", "wrap"]] = ("nearest", "wrap" if is_round else "nearest")
     totals = (np.bincount(cells, weights, shape[0] * shape[1]) for weights in (errors_um, np.ones(len(cells))))
@@ -150,7 +150,7 @@ def smoothed(cells: IndexArray, errors_um: FloatArray, shape: tuple[int, int], *
 
 
 def _seen(mesh: trimesh.Trimesh, points: FloatArray, errors_um: FloatArray) -> list[Panel]:
-    """Return a part from two sides, with the points that are not hidden from there."""
+    """Return a part from two sides, with the points that are visible from there."""
     caster, panels = RayCaster(mesh), []
     for azimuth_deg, elevation_deg in VIEWS:
         view = View.of(mesh, azimuth_deg, elevation_deg)

@@ -1,13 +1,13 @@
-"""What each part of the chain contributes to the error of the cloud, found by switching it off.
+"""The contribution of each error source to the error of the cloud, found by switching it off.
 
-A scan's own profiles are aligned again and again, each time with one contribution made perfect, or all but one. The
-chain of the table's angle, from the truth to the wire:
+The profiles of a scan are aligned repeatedly, each time with one source made perfect, or with all but one. The chain of
+the table's angle, from the truth to the protocol:
 
     true angle at the exposure -> [timing] -> at the edge -> [backlash] -> motor -> [encoder] -> count
         -> [rounding] -> wire
 
-Each step's error is the difference of two angles of that table itself, so that nothing is assumed of its encoder or
-gears. With all switched on the angle is exactly that of the wire; with all off it is exactly the true one.
+The error of each step is the difference of two angles of this table itself, so nothing is assumed about its encoder or
+gears. With all sources on, the angle is exactly that of the protocol; with all off, it is exactly the true one.
 """
 
 from collections.abc import Callable, Collection
@@ -23,14 +23,14 @@ from planner.scanning.alignment import Calibration, aligned, probe_poses
 from planner.scanning.latched_run import LatchedRun
 from planner.scanning.probe import Profiles
 
-# At most so many points are looked at, and at least half as many of a larger cloud: their sigma is good to 0.5 %.
+# Maximum number of points that are used; of a larger cloud at least half as many: their sigma is accurate to 0.5 %.
 SAMPLES = 40_000
-# trimesh holds all triangles near all points at once, some 25 kB a point on a fine mesh.
+# trimesh stores all triangles near all points at once, some 25 kB per point on a fine mesh.
 _NEAREST_BLOCK = 1000
 
 
 class Source(StrEnum):
-    """A contribution to the error."""
+    """An error source."""
 
     PROBE = "probe noise"
     ROUNDING = "rounding on the wire"
@@ -44,7 +44,7 @@ TABLE_PARTS = (Source.ROUNDING, Source.ENCODER, Source.BACKLASH)
 
 
 class Distances(NamedTuple):
-    """Signed distances to the surface, outward positive, in mm: `p95` and `greatest` are without sign."""
+    """Signed distances to the surface, outward positive, in mm: `p95` and `greatest` are absolute values."""
 
     mean: float
     sigma: float
@@ -53,18 +53,18 @@ class Distances(NamedTuple):
 
     @classmethod
     def of(cls, distances_mm: FloatArray) -> "Distances":
-        """Return the figures of some distances."""
+        """Return the statistics of some distances."""
         size = np.abs(distances_mm)
         return cls(*map(float, (distances_mm.mean(), distances_mm.std(), np.percentile(size, 95.0), size.max())))
 
 
 class Contribution(NamedTuple):
-    """One part's share, in mm.
+    """The contribution of one source, in mm.
 
     Attributes:
-        displacement_mm: Root mean square of how far it alone moves the points.
-        across_mm: The same across the surface, which is what is seen as distance from it.
-        without_mm: Across the surface, what is left when it alone is switched off.
+        displacement_mm: root mean square of the displacement of the points by this source alone.
+        across_mm: the component perpendicular to the surface, which is measured as distance from it.
+        without_mm: the remaining component perpendicular to the surface when only this source is switched off.
     """
 
     displacement_mm: float
@@ -73,7 +73,7 @@ class Contribution(NamedTuple):
 
 
 class Total(NamedTuple):
-    """All parts together, in mm; as in `Contribution`."""
+    """All sources together, in mm; as in `Contribution`."""
 
     displacement_mm: float
     across_mm: float
@@ -84,16 +84,16 @@ class ErrorBudget:
     """The error of a cloud.
 
     Attributes:
-        distances: Cloud against mesh, exactly, over the samples.
-        total: All parts together.
-        none_mm: Displacement with all of them off: what is left is the arithmetic's rounding.
-        parts: Each part.
-        sum_mm: Root of the sum of the parts' squares, to be compared with `total.displacement_mm`.
-        rounding_mm: What rounding comes to in closed form: a uniform error of one step, times the radius.
-        radius_mm: Root mean square of the points' distance from the table's axis.
-        samples: How many points it was made from.
+        distances: cloud against mesh, exact, over the samples.
+        total: all sources together.
+        none_mm: displacement with all of them off: the rest is rounding of the arithmetic.
+        parts: each source.
+        sum_mm: root of the sum of the squares of the sources, for comparison with `total.displacement_mm`.
+        rounding_mm: the rounding error in closed form: a uniform error of one step, times the radius.
+        radius_mm: root mean square of the points' distance from the table's axis.
+        samples: number of points.
         errors_mm: `(samples,)` signed distance of each.
-        points_W: `(samples, 3)` where they are.
+        points_W: `(samples, 3)` positions of the points.
     """
 
     distances: Distances
@@ -109,19 +109,19 @@ class ErrorBudget:
 
 
 class Samples:
-    """An even choice of a cloud's points, with what is true of them, in bounded memory.
+    """An even selection of a cloud's points with their ground truth, in bounded memory.
 
-    When it is full every other point is given up, and from then on half as many are taken.
+    When it is full, every other point is removed, and from then on half as many are taken.
     """
 
     def __init__(self, most: int = SAMPLES) -> None:
-        """Hold up to `most` points."""
+        """Store up to `most` points."""
         self._most, self._every, self._passed = most, 1, 0
         self._kept: list[tuple[IndexArray, Profiles]] = []
         self.count = 0
 
     def take(self, first_row: int, profiles: Profiles) -> None:
-        """Choose from the profiles of a block whose first row in the run is `first_row`."""
+        """Select from the profiles of a block whose first row in the run is `first_row`."""
         order = self._passed + np.arange(len(profiles.profiles))
         self._passed += len(order)
         self._keep(order, profiles._replace(profiles=profiles.profiles + first_row))
@@ -137,19 +137,19 @@ class Samples:
         self.count += int(chosen.sum())
 
     def all(self) -> Profiles:
-        """Return the points chosen; `profiles` are rows of the run."""
+        """Return the selected points; `profiles` are rows of the run."""
         return Profiles._make(np.concatenate(column) for column in zip(*(each for _, each in self._kept), strict=True))
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """A run with the true placements and those that it was aligned with: it can be aligned with any parts off.
+    """A run with the true and the calibrated placements. It can be aligned with any sources switched off.
 
     Attributes:
-        run: What was latched.
-        true: The placements as they are.
-        known: The placements as calibrated.
-        flange_poses: The arm's forward kinematics, joints (deg) to `(n, 4, 4)`.
+        run: the latched values.
+        true: the true placements.
+        known: the calibrated placements.
+        flange_poses: the arm's forward kinematics, joints (deg) to `(n, 4, 4)`.
     """
 
     run: LatchedRun
@@ -158,7 +158,7 @@ class Chain:
     flange_poses: Callable[[FloatArray], FloatArray]
 
     def angles_deg(self, on: Collection[Source]) -> FloatArray:
-        """Return the table's angle as latched with some parts of the chain switched on."""
+        """Return the table's angle as latched with some sources of the chain switched on."""
         run = self.run
         angle = run.edge_deg if Source.TIMING in on else run.true_deg
         if run.tells_truth:
@@ -171,20 +171,20 @@ class Chain:
         return angle
 
     def poses(self, on: Collection[Source]) -> FloatArray:
-        """Return T_WS `(n, 4, 4)` with some parts switched on."""
+        """Return T_WS `(n, 4, 4)` with some sources switched on."""
         joints = self.run.joints_deg if Source.TIMING in on else self.run.true_joints_deg
         placements = self.known if Source.CALIBRATION in on else self.true
         return probe_poses(placements, self.flange_poses(joints), self.angles_deg(on))
 
 
 def error_budget_of(chain: Chain, samples: Profiles, mesh: trimesh.Trimesh, wire_step_deg: float) -> ErrorBudget:
-    """Return what contributes how much to the error of a cloud's samples.
+    """Return the contribution of each source to the error of a cloud's samples.
 
     Args:
-        chain: The run, and what is true.
-        samples: Points of it.
-        mesh: The workpiece.
-        wire_step_deg: The wire's smallest difference.
+        chain: the run with its ground truth.
+        samples: points of it.
+        mesh: the workpiece.
+        wire_step_deg: resolution of the protocol.
     """
     everything = frozenset(Source)
 
@@ -223,7 +223,7 @@ def error_budget_of(chain: Chain, samples: Profiles, mesh: trimesh.Trimesh, wire
 
 
 def signed_distances_mm(mesh: trimesh.Trimesh, points: FloatArray) -> FloatArray:
-    """Return the distance `(n,)` of each point `(n, 3)` from the nearest place of a surface, outside positive."""
+    """Return the distance `(n,)` of each point `(n, 3)` from the nearest point of a surface, outside positive."""
     signed = np.empty(len(points))
     normals = np.asarray(mesh.face_normals)
     for first in range(0, len(points), _NEAREST_BLOCK):
@@ -235,5 +235,5 @@ def signed_distances_mm(mesh: trimesh.Trimesh, points: FloatArray) -> FloatArray
 
 
 def _rms(values: FloatArray, dimensions: int = 1) -> float:
-    """Return the root mean square of values, or of vectors' lengths; 0 of none."""
+    """Return the root mean square of values, or of the lengths of vectors; 0 for an empty array."""
     return float(np.sqrt(dimensions * np.mean(np.square(values)))) if values.size else 0.0

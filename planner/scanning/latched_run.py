@@ -1,6 +1,6 @@
-"""The motion of a scan on a table, with the probe firing: what was latched on each trigger.
+"""The motion of a scan on a table with a triggering probe, and the values latched at each trigger.
 
-Nothing is measured here yet; this is the part that needs the table, and it ends with one row for each profile.
+This part needs the table, but measures nothing yet. Its result has one row for each profile.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -17,7 +17,7 @@ from planner.execution.execute import Settings, bring_to, execute
 from planner.execution.robot_motion import RobotMotion, robot_motion
 from planner.execution.run_record import Record
 from planner.execution.table_motion import Phase, TableMotion
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.scanning.latching import Drop, Pairing, RobotLatch, TableReading, Tolerances, Trigger, pair
 from planner.scanning.trigger_line import TableTruth, TriggerFaults, TriggerLine, robot_latch_times_s
 from planner.table.motion import Limits
@@ -25,11 +25,12 @@ from planner.table.wire import Wire
 from protocol import TableClient
 from protocol.progress import Progress
 
-# The first profile comes when the first command has been sent.
+# Time of the first profile: the first command has been sent by then.
 _FIRST_PROFILE_S = 0.06
-# From a trigger to the reading of its latch.
+# Time from a trigger to the reading of its latch.
 _READING_AFTER_S = 0.002
-# How much more the table may be off its plan at one trigger than at those around it; the emulator stays below a half.
+# Allowed difference of the table's deviation from its plan between a trigger and its neighbors; the emulator stays
+# below half of it.
 _TRACKING_DEG = 0.08
 
 
@@ -38,13 +39,13 @@ class NothingScannedError(PlannerError):
 
 
 class TriggerConditions(NamedTuple):
-    """How the probe fires.
+    """Settings of the probe's triggers.
 
     Attributes:
-        rate_hz: Profiles a second.
-        delay_s: The longest that an edge takes to the robot or to the table (an estimate: what optocouplers take).
-        faults: What goes wrong on the way.
-        seed: Chooses the delays.
+        rate_hz: profiles per second.
+        delay_s: maximum delay of an edge to the robot or to the table (an estimate for optocouplers).
+        faults: faults of the triggers.
+        seed: random seed of the delays.
     """
 
     rate_hz: float = PROFILES_HZ
@@ -55,22 +56,23 @@ class TriggerConditions(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LatchedRun:
-    """The profiles that have a robot pose and a table angle, `n` of them, and what is true of them.
+    """The `n` profiles with a robot pose and a table angle, and their ground truth.
 
     Attributes:
-        numbers: `(n,)` of the profiles.
+        numbers: `(n,)` numbers of the profiles.
         times_s: `(n,)` in the time of the motion.
         joints_deg: `(n, 6)` as latched.
-        angles_deg: `(n,)` table angles as they came over the wire.
+        angles_deg: `(n,)` table angles as transmitted.
         true_joints_deg: `(n, 6)` when the profile was taken.
-        true_deg: `(n,)` the table's own angle then, from its encoder's zero; that of the wire where it is unknown.
-        edge_deg: `(n,)` the table's own angle when its trigger arrived, or as `true_deg`.
-        shaft_deg: `(n,)` the motor's angle then, over the gear ratio, or as `true_deg`.
-        latched_deg: `(n,)` the encoder then, before rounding, or as `true_deg`.
-        tells_truth: Whether the port gives these four.
-        triggers: How many profiles the probe took along the path.
-        dropped: Why the other profiles have no pose, by their number.
-        record: What was sent to the table and seen of it.
+        true_deg: `(n,)` true angle of the table at that time, from its encoder's zero; the transmitted one if it is
+            unknown.
+        edge_deg: `(n,)` true angle of the table when its trigger arrived, or as `true_deg`.
+        shaft_deg: `(n,)` angle of the motor at that time, divided by the gear ratio, or as `true_deg`.
+        latched_deg: `(n,)` encoder angle at that time, before rounding, or as `true_deg`.
+        tells_truth: whether the port provides these four.
+        triggers: number of profiles that the probe took along the path.
+        dropped: why the other profiles have no pose, by their number.
+        record: the commands and the readings.
     """
 
     numbers: IndexArray
@@ -89,7 +91,7 @@ class LatchedRun:
 
     @property
     def failure(self) -> str | None:
-        """Why the motion ended early; None when it came to its end."""
+        """Why the motion ended early; None if it was completed."""
         return self.record.failure
 
 
@@ -128,16 +130,16 @@ def joined(runs: Sequence[LatchedRun]) -> LatchedRun:
 
 
 class ReadingMotion(TableMotion):
-    """A plan's motion whose latch is read after each profile, not at each scan location."""
+    """A plan's motion in which the latch is read after each profile, not at each scan location."""
 
     def __init__(self, plan: Plan, limits: Limits, rate_hz: float) -> None:
-        """Lay out the motion; from `_FIRST_PROFILE_S` on there is a profile in each period of the scan's legs."""
+        """Create the motion. From `_FIRST_PROFILE_S` on there is a profile in each period of the scan's legs."""
         super().__init__(plan, limits)
         self._rate_hz = rate_hz
 
     @cached_property
     def column_times_s(self) -> FloatArray:
-        """(n,) when to read: the first starts the probe, the others come after their profiles."""
+        """(n,) times of the readings: the first one starts the probe, the others follow their profiles."""
         count = int((self.scan_end_s - _FIRST_PROFILE_S) * self._rate_hz) + 1
         times_s = _FIRST_PROFILE_S + np.arange(max(1, count)) / self._rate_hz
         times_s[1:] += _READING_AFTER_S
@@ -145,11 +147,11 @@ class ReadingMotion(TableMotion):
 
     @property
     def scan_end_s(self) -> float:
-        """When the last scan location is reached."""
+        """The time of the last scan location."""
         return max((leg.end_s for leg in self.legs if leg.phase is Phase.SCAN), default=0.0)
 
     def is_scanning(self, time_s: float) -> bool:
-        """Return whether the probe is on its path: neither in a pause nor before or after it all."""
+        """Return whether the probe is on its path: not in a pause, and not before the start or after the end."""
         return 0.0 <= time_s <= self.scan_end_s and self.leg_at(time_s).phase is Phase.SCAN
 
 
@@ -164,23 +166,23 @@ def run_latched(
     settings: Settings | None = None,
     progress: Progress | None = None,
 ) -> LatchedRun:
-    """Make the motion of a plan, with the probe firing, and return what was latched.
+    """Execute the motion of a plan with a triggering probe, and return the latched values.
 
     Args:
-        table: The client at the table's port.
-        line: The probe's triggers.
-        plan: The table's motion.
-        joints_deg: `(n + 1, 6)` the robot's joints at the plan's locations.
-        limits: Greatest S and A.
-        wire: What the commands have to pass.
-        conditions: How the probe fires.
-        progress: Called with the time of the motion and its end, in ms.
-        settings: How the motion is run.
+        table: the client at the table's port.
+        line: the trigger line of the probe.
+        plan: the motion of the table.
+        joints_deg: `(n + 1, 6)` joints of the robot at the plan's locations.
+        limits: maximum S and A.
+        wire: properties of the serial line.
+        conditions: settings of the probe's triggers.
+        progress: called with the time of the motion and its end, in ms.
+        settings: settings for the execution.
 
     Raises:
-        NothingScannedError: No profile is complete.
-        PlannerError: The commands do not fit the wire.
-        TableError: The table did not come to the start.
+        NothingScannedError: no profile is complete.
+        PlannerError: the serial line is too slow for the commands.
+        TableError: the table did not reach the start.
     """
     motion = ReadingMotion(plan, limits, conditions.rate_hz)
     bring_to(table, round(motion.start_deg, wire.decimals), limits, wire)
@@ -188,13 +190,13 @@ def run_latched(
     record = execute(table, motion, limits, wire, settings, line, progress)
     line.stop()
     times_s = line.times_s() - record.origin_s
-    # Those in pauses and after the end overwrite the table's latch as well.
+    # Triggers in pauses and after the end overwrite the table's latch as well.
     triggers = [Trigger(k, time_s) for k, time_s in enumerate(times_s.tolist())]
     on_path = {trigger.number for trigger in triggers if motion.is_scanning(trigger.time_s)}
     robot = robot_motion(motion, joints_deg)
     latches = _robot_latches(robot, times_s, conditions)
     readings = list(_readings(record, wire))
-    # Half a step of the wire may be rounded off.
+    # The rounding error is at most half a step of the protocol.
     tolerances = Tolerances(table_deg=_TRACKING_DEG + 0.5 * wire.quantum)
     pairing = pair(
         triggers, latches, readings, lambda at_s: motion.state_at(at_s - settings.encoder_delay_s).angle_deg, tolerances
@@ -220,18 +222,21 @@ def run_latched(
 
 
 def _robot_latches(robot: RobotMotion, times_s: FloatArray, conditions: TriggerConditions) -> list[RobotLatch]:
-    """Return what an ideal robot latches on the triggers that arrive there."""
+    """Return the values that an ideal robot latches at the triggers that arrive there."""
     at_s = robot_latch_times_s(times_s, conditions.delay_s, conditions.faults, conditions.seed)
     return [RobotLatch(time_s, joints) for time_s, joints in zip(at_s, _joints_at(robot, at_s), strict=True)]
 
 
 def _truth(line: TriggerLine, pairing: Pairing) -> TableTruth:
-    """Return what is true of the table at the profiles' triggers; all as on the wire where the port does not tell."""
+    """Return the ground truth of the table at the profiles' triggers.
+
+    It consists of the transmitted values if the port does not provide it.
+    """
     truth, wire_deg = line.truth(), pairing.angles_deg
     if truth is None:
         return TableTruth(wire_deg, wire_deg, wire_deg, wire_deg)
     exposure_deg, edge_deg, shaft_deg, latched_deg = (part[pairing.numbers] for part in truth)
-    # The table may have missed a trigger in such slow motion that nobody could tell.
+    # The table may have missed a trigger in such a slow motion that this is not detectable.
     missed = np.isnan(latched_deg)
     return TableTruth(
         exposure_deg,
@@ -242,7 +247,7 @@ def _truth(line: TriggerLine, pairing: Pairing) -> TableTruth:
 
 
 def _readings(record: Record, wire: Wire) -> Iterator[TableReading]:
-    """Yield the answers to `L`; the table is looked at between the trigger and the question."""
+    """Yield the replies to `L`; the ground truth of the table is read between trigger and command."""
     on_the_way_s = wire.seconds(2) + wire.turnaround_s + wire.latency_s
     looked_s = {each.column: each.time_s for each in record.observations if each.source == "inside"}
     for each in record.observations:
@@ -263,4 +268,4 @@ def _why_nothing(triggers: int, dropped: dict[int, Drop], failure: str | None) -
         return "nothing was scanned: the probe took no profile; its rate is too low for a scan this short"
     reasons = [drop.value for drop in dropped.values()]
     most = max(set(reasons), key=reasons.count)
-    return f"nothing was scanned: all {triggers} profiles were dropped, most because {most}"
+    return f"nothing was scanned: all {triggers} profiles were dropped, mostly because {most}"

@@ -1,10 +1,10 @@
-"""Which robot pose and which table angle belong to which profile: what was latched on the same trigger.
+"""Assign robot poses and table angles to profiles: those latched at the same trigger.
 
-The probe numbers its profiles and stamps them with their time. The robot stamps each pose that it latches. The table
-does not: `L` says what was latched last, whenever that was. So a reading belongs to the last trigger before it, as long
-as no other trigger came while it was on its way; and it must agree with the motion that the table is known to make, or
-the table has missed that trigger, or heard one that was none. A profile that misses its partner is dropped; it never
-takes another's.
+The probe numbers its profiles and adds a time stamp. The robot adds a time stamp to each latched pose. The table does
+not: `L` returns the last latched angle, without its time. So a reading belongs to the last trigger before it, if no
+other trigger came during the reading. It must also agree with the known motion of the table; otherwise the table missed
+that trigger, or detected a false one. A profile without a matching value is dropped; it never takes the value of
+another one.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -15,28 +15,28 @@ import numpy as np
 
 from planner.arrays import FloatArray, IndexArray
 
-# Over which the planned speed is taken, and below which it shows no lag.
+# The interval for the planned speed, and the speed below which a lag is not visible.
 _STEP_S, _SLOW_DEG_S = 0.005, 1.0
-# How many readings before and after tell how far the table is off its plan at a trigger.
+# Number of readings before and after a trigger that determine the table's deviation from its plan.
 _NEIGHBORS = 7
 
 
 class Trigger(NamedTuple):
-    """A profile that the probe has taken: its number and its time."""
+    """A profile of the probe: its number and its time."""
 
     number: int
     time_s: float
 
 
 class RobotLatch(NamedTuple):
-    """Joints (deg) that the robot has latched, and when."""
+    """Joints (deg) latched by the robot, and the time."""
 
     time_s: float
     joints_deg: FloatArray
 
 
 class TableReading(NamedTuple):
-    """An answer to `L`: it was given between `earliest_s` and `latest_s`."""
+    """A reply to `L`, received between `earliest_s` and `latest_s`."""
 
     earliest_s: float
     latest_s: float
@@ -48,15 +48,15 @@ class Drop(Enum):
 
     ROBOT_MISSED = "the robot latched nothing"
     TABLE_UNREAD = "the next trigger came before the table's latch was read"
-    TABLE_STRAY = "what the table latched was not this trigger"
+    TABLE_STRAY = "the latch of the table is from another trigger"
 
 
 class Tolerances(NamedTuple):
-    """What latches of the same trigger may differ by.
+    """Allowed differences between latches of the same trigger.
 
     Attributes:
-        robot_s: The robot's time stamp against the probe's.
-        table_deg: The table's angle against its plan, beside how far it is off the plan all the while.
+        robot_s: time stamp of the robot minus that of the probe.
+        table_deg: table angle minus planned angle, relative to the usual deviation from the plan.
     """
 
     robot_s: float = 0.001
@@ -64,13 +64,13 @@ class Tolerances(NamedTuple):
 
 
 class Pairing(NamedTuple):
-    """The triggers that are complete, and why the others are not.
+    """The complete triggers, and the reasons for the others.
 
     Attributes:
-        numbers: `(n,)` of the profiles that have a pose, ascending.
+        numbers: `(n,)` numbers of the profiles with a pose, ascending.
         joints_deg: `(n, 6)`.
         angles_deg: `(n,)`.
-        dropped: The others.
+        dropped: the others.
     """
 
     numbers: IndexArray
@@ -79,7 +79,7 @@ class Pairing(NamedTuple):
     dropped: dict[int, Drop]
 
     def only(self, numbers: Collection[int]) -> "Pairing":
-        """Return the pairing of some of the triggers."""
+        """Return the assignment for some of the triggers."""
         kept = np.isin(self.numbers, list(numbers))
         dropped = {number: why for number, why in self.dropped.items() if number in numbers}
         return Pairing(self.numbers[kept], self.joints_deg[kept], self.angles_deg[kept], dropped)
@@ -92,14 +92,14 @@ def pair(
     planned_deg: Callable[[float], float],
     tolerances: Tolerances | None = None,
 ) -> Pairing:
-    """Return what belongs together.
+    """Return the complete assignment.
 
     Args:
-        triggers: The probe's profiles, by ascending time.
-        robot: What the robot has latched.
-        table: The answers to `L`.
-        planned_deg: The angle at which the table is planned to be at a time.
-        tolerances: What latches of the same trigger may differ by.
+        triggers: profiles of the probe, in ascending order of time.
+        robot: the joints latched by the robot.
+        table: the replies to `L`.
+        planned_deg: the planned angle of the table at a time.
+        tolerances: allowed differences between latches of the same trigger.
     """
     tolerances = tolerances or Tolerances()
     joints = _robot_partners(triggers, robot, tolerances.robot_s)
@@ -125,7 +125,7 @@ def pair(
 def _robot_partners(
     triggers: Sequence[Trigger], robot: Sequence[RobotLatch], tolerance_s: float
 ) -> dict[int, FloatArray]:
-    """Return the joints of each trigger that the robot stamped with its time; of two such, the nearer."""
+    """Return the joints of each trigger with the robot's time stamp near its time; of two, the nearer one."""
     latches = sorted(robot, key=lambda latch: latch.time_s)
     stamps = np.array([latch.time_s for latch in latches])
     partners = {}
@@ -139,7 +139,7 @@ def _robot_partners(
 
 
 def _table_partners(triggers: Sequence[Trigger], table: Sequence[TableReading]) -> dict[int, float]:
-    """Return the first reading that belongs to each trigger for certain."""
+    """Return the first reading that certainly belongs to each trigger."""
     times = np.array([trigger.time_s for trigger in triggers])
     partners: dict[int, float] = {}
     for reading in table:
@@ -155,9 +155,9 @@ def _strays(
     planned_deg: Callable[[float], float],
     tolerance_deg: float,
 ) -> set[int]:
-    """Return the triggers whose reading is off the plan by another amount than the readings around it.
+    """Return the triggers whose reading has another deviation from the plan than the readings around it.
 
-    How far this table lags behind its plan, more than the caller knows, is taken from the readings themselves.
+    The lag of this table behind its plan, beyond the one known to the caller, is determined from the readings.
     """
     read = [trigger for trigger in triggers if trigger.number in readings]
     off_deg = np.array([readings[trigger.number] - planned_deg(trigger.time_s) for trigger in read])
@@ -177,7 +177,7 @@ def _strays(
 
 
 def _lag_s(off_deg: FloatArray, speeds_deg_s: FloatArray) -> float:
-    """Return by how much readings are late: the median of -off over speed, weighted by the speed."""
+    """Return the delay of the readings: the median of -deviation over speed, weighted by the speed."""
     fast = np.abs(speeds_deg_s) > _SLOW_DEG_S
     if not fast.any():
         return 0.0

@@ -1,4 +1,4 @@
-"""A part as it is seen from a side: shaded, in an orthographic view, with points painted on what is seen of it."""
+"""A shaded orthographic view of a part from one side, with its visible points in color."""
 
 from itertools import product
 from typing import NamedTuple
@@ -10,14 +10,14 @@ from planner.arrays import FloatArray, IndexArray
 from planner.geometry.ray_casting import RayCaster
 
 VIEWS = ((-60.0, 35.0), (120.0, 35.0))
-"""From where a part is looked at: azimuth and elevation in deg."""
+"""Direction of the view: azimuth and elevation in deg."""
 _WIDTH, _HEIGHT = 700, 560
-# So many rows of a picture are cast at once, which bounds the memory.
+# Rows of a picture that are cast at once, which bounds the memory.
 _ROWS_AT_ONCE = 40
-# A point this far below the surface is still on it.
+# A point this far below the surface still counts as visible.
 _ON_SURFACE_MM = 1.0
 BARE = np.array((0.80, 0.81, 0.83))
-"""The color of the bare part in full light."""
+"""The color of the part without points in full light."""
 
 Image = FloatArray
 PixelArray = IndexArray
@@ -35,7 +35,7 @@ class View(NamedTuple):
 
     @classmethod
     def of(cls, mesh: trimesh.Trimesh, azimuth_deg: float, elevation_deg: float) -> "View":
-        """Return the view that shows all of a mesh."""
+        """Return the view that contains a whole mesh."""
         azimuth, elevation = np.radians((azimuth_deg, elevation_deg))
         ahead = -np.array((np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)))
         right = np.cross(ahead, (0.0, 0.0, 1.0))
@@ -55,7 +55,7 @@ class View(NamedTuple):
         return row, column, off @ self.ahead + 0.5 * self.span_mm
 
     def surface(self, caster: RayCaster) -> tuple[Image, FloatArray]:
-        """Return the bare part, shaded, `(h, w, 3)`, and its depth `(h, w)`, NaN beside it."""
+        """Return the shaded part without points, `(h, w, 3)`, and its depth `(h, w)`, NaN beside it."""
         image, depths_mm = np.ones((_HEIGHT, _WIDTH, 3)), np.empty((_HEIGHT, _WIDTH))
         light = self.up + 0.4 * self.right - 1.2 * self.ahead
         x = (np.arange(_WIDTH) + 0.5 - 0.5 * _WIDTH) * self.pixel_mm
@@ -74,13 +74,13 @@ class View(NamedTuple):
     def seen(
         self, points: FloatArray, depths_mm: FloatArray, size: int = 1, shift: tuple[int, int] = (0, 0)
     ) -> tuple[PixelArray, PixelArray, PixelArray]:
-        """Return row, column and number of the points that lie in the picture and not behind the surface in it.
+        """Return row, column and number of the points that are in the picture and not behind the surface in it.
 
         Args:
             points: `(n, 3)`.
-            depths_mm: The depth of the surface, of `surface`.
-            size: Pixels across a point: the slope of the surface within them counts as on it.
-            shift: Rows and columns from the point's own pixel to the one looked at.
+            depths_mm: depth of the surface, from `surface`.
+            size: size of a point in pixels; points within the slope of the surface inside it are visible.
+            shift: rows and columns from the point's own pixel to the one that is tested.
         """
         row, column, depth_mm = self.pixels(points)
         row, column = row + shift[0], column + shift[1]
@@ -91,7 +91,7 @@ class View(NamedTuple):
 
 
 def painted(view: View, caster: RayCaster, points: FloatArray, colors: FloatArray, size: int) -> Image:
-    """Return the part with those of the points that are not behind it, as squares of `size` pixels."""
+    """Return the part with its visible points, as squares of `size` pixels."""
     image, depths_mm = view.surface(caster)
     shade = np.clip(image / BARE, 0.0, 1.0)
     shifts = range(-(size // 2), size - size // 2)

@@ -1,4 +1,4 @@
-"""Point clouds on disk, written as they come: PLY (binary) and XYZ (text). A file appears when it is closed."""
+"""Point clouds on disk, written continuously: PLY (binary) and XYZ (text). A file appears when it is closed."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -11,24 +11,25 @@ import numpy as np
 from planner.arrays import FloatArray, IndexArray
 from protocol.whole_file import whole_file
 
-# A vertex as it lies in the file. Single precision leaves 0.03 micrometers at 500 mm.
+# A vertex in the file. Single precision has an error of 0.03 micrometers at 500 mm.
 _COORDINATES = ("x", "y", "z", "beam_x", "beam_y", "beam_z")
 _VERTEX = np.dtype([*((name, "<f4") for name in _COORDINATES), ("profile", "<u4")])
 _WITH_NORMAL = ("x", "y", "z", "nx", "ny", "nz")
 
 
 class PlyWriter:
-    """A binary PLY file of points (mm), each with the direction in which the laser met it and its profile's number.
+    """A binary PLY file of points (mm), each with the direction of the laser beam and the number of its profile.
 
-    Used as a context. What was written is kept: on an exception, too, the file is closed in order and appears.
+    Used as a context manager. The data written so far are kept: after an exception, too, the file is closed properly
+    and appears.
     """
 
     def __init__(self, file: Path, comment: str = "") -> None:
-        """Begin the file.
+        """Create the file.
 
         Args:
-            file: Where it appears in the end.
-            comment: A line for its header.
+            file: its final path.
+            comment: a line for its header.
         """
         self.count = 0
         self._comment = comment.replace("\n", " ")
@@ -88,10 +89,10 @@ def _header(comments: Sequence[str], count: int, properties: Sequence[str]) -> b
 
 
 class XyzWriter:
-    """A text file with a line for each point: x y z in mm, to a tenth of a micrometer. Used as `PlyWriter`."""
+    """A text file with one line per point: x y z in mm, to a tenth of a micrometer. Used like `PlyWriter`."""
 
     def __init__(self, file: Path) -> None:
-        """Begin the file."""
+        """Create the file."""
         self._stack = ExitStack()
         self._file = self._stack.enter_context(whole_file(file)).open("w", encoding="ascii")
 

@@ -1,8 +1,8 @@
-"""A laser line probe, as a parametric model: one laser line, two cameras, no particular make.
+"""A parametric model of a laser line probe: one laser line, two cameras, no specific product.
 
 Frame S: origin at the laser's exit, +Z along the beam, +X along the line, +Y the scan direction. A point of a profile
-is measured when the laser's ray meets the surface within the range, at an incidence that still throws light back, and
-at least one camera sees the spot. Range is the depth z.
+is measured under three conditions. The laser's ray meets the surface within the range; its incidence still reflects
+light; at least one camera sees the spot. Range is the depth z.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from planner.geometry.ray_casting import RayCaster
 
 
 class Sight(IntEnum):
-    """How far a point of the surface came to being measured: the first condition that failed, or none."""
+    """The state of a point of the surface: the first condition that failed, or measured."""
 
     NEVER_IN_VIEW = 0
     OUT_OF_RANGE = 1
@@ -28,17 +28,17 @@ class Sight(IntEnum):
 
 @dataclass(frozen=True)
 class LaserProbe:
-    """The probe's optics. The defaults are a typical short-range triangulation probe's.
+    """The optics of the probe. The defaults are those of a typical short-range triangulation probe.
 
     Attributes:
-        nearest_mm: Depth at which the range begins.
-        farthest_mm: Depth at which the range ends.
-        half_width: Half the line's width over the depth: the tangent of the fan's half-angle.
-        points_per_line: Points of one profile, at equal spacing on a plane across the beam.
-        line_rate_hz: Profiles a second that the probe can take.
-        incidence_limit_deg: Greatest angle between beam and normal.
-        cameras_mm: Where the two cameras are, in frame S.
-        noise_mm: Standard deviation of a point along its ray (the paper: 25 micrometers).
+        nearest_mm: depth at the start of the range.
+        farthest_mm: depth at the end of the range.
+        half_width: half of the line's width over the depth: the tangent of the fan's half-angle.
+        points_per_line: points of one profile, with equal spacing on a plane perpendicular to the beam.
+        line_rate_hz: maximum profiles per second.
+        incidence_limit_deg: maximum angle between beam and normal.
+        cameras_mm: positions of the two cameras, in frame S.
+        noise_mm: standard deviation of a point along its ray (the paper: 25 micrometers).
     """
 
     nearest_mm: float = 100.0
@@ -70,11 +70,11 @@ class Profiles(NamedTuple):
     """The measured points of several profiles, one row each, in the order of the profiles and along each line.
 
     Attributes:
-        profiles: `(m,)` which of the poses each point was measured from.
-        points_S: `(m, 3)` where the probe says that it is, in frame S.
+        profiles: `(m,)` pose index of each point.
+        points_S: `(m, 3)` measured position, in frame S.
         rays_S: `(m, 3)` directions of the laser's rays in frame S.
-        noise_mm: `(m,)` by how much it is too far along its ray.
-        true_W: `(m, 3)` where it truly is, in the frame that the poses are in.
+        noise_mm: `(m,)` error of the position along its ray.
+        true_W: `(m, 3)` true position, in the frame of the poses.
         normals_W: `(m, 3)` outward normals of the surface there.
     """
 
@@ -93,14 +93,14 @@ def measure(
     numbers: IndexArray | None = None,
     seed: int = 0,
 ) -> Profiles:
-    """Return the profiles that the probe takes of a surface.
+    """Return the profiles of a surface.
 
     Args:
-        caster: The surface, in frame W.
-        probe: The probe.
-        T_WS: Its poses at the triggers, `(n, 4, 4)` in mm.
-        numbers: `(n,)` numbers of the profiles, which choose their noise; 0 to n - 1 where left out.
-        seed: Chooses the noise, with the profile's number: it does not depend on what else is measured.
+        caster: the surface, in frame W.
+        probe: the probe.
+        T_WS: its poses at the triggers, `(n, 4, 4)` in mm.
+        numbers: `(n,)` numbers of the profiles, which determine their noise; default: 0 to n - 1.
+        seed: seed of the noise, together with the profile's number: the noise does not depend on other measurements.
     """
     rays_S = probe.rays()
     numbers = np.arange(len(T_WS)) if numbers is None else numbers
@@ -132,13 +132,13 @@ def sight(
     normals: FloatArray,
     depths_mm: FloatArray,
 ) -> CodeArray:
-    """Return for each point that the laser strikes how far it comes to being measured, `(m,)` of `Sight`.
+    """Return the state of each point in the laser line, `(m,)` of `Sight`.
 
     Args:
-        caster: The surface.
-        probe: The probe.
-        T_WS: Poses of the probe, `(n, 4, 4)`.
-        profiles: `(m,)` the pose that each point belongs to.
+        caster: the surface.
+        probe: the probe.
+        T_WS: poses of the probe, `(n, 4, 4)`.
+        profiles: `(m,)` pose index of each point.
         points: `(m, 3)` in frame W.
         normals: `(m, 3)` of the surface there.
         depths_mm: `(m,)` depths z in frame S.
@@ -161,5 +161,5 @@ def sight(
 
 
 def _noise(probe: LaserProbe, seed: int, number: int) -> FloatArray:
-    """Return the noise of a profile's points, those that are not measured included."""
+    """Return the noise of all points of a profile, including those that are not measured."""
     return probe.noise_mm * np.random.default_rng((seed, number)).standard_normal(probe.points_per_line)

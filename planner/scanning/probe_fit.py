@@ -1,4 +1,4 @@
-"""The least-squares fit of the probe's place on the flange: all points of all views lie on one sphere."""
+"""The least-squares fit of the probe's pose on the flange: all points of all views are on one sphere."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,12 +9,13 @@ from scipy.spatial.transform import Rotation
 
 from planner.arrays import FloatArray, IndexArray
 
-# Beyond this incidence a sphere is not measured; a ray that meets it flatter, or misses it, has the wrong sphere.
+# Beyond this incidence a sphere is not measured. A ray with a larger incidence, or one that misses, has the wrong
+# sphere.
 _LEAST_COSINE = 0.2
 _SEARCH_EVALUATIONS = 60
 
 TURN, SHIFT, CENTER, RADIUS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 10)
-"""The unknowns: turn (rad) and shift (mm) of the probe on the flange, the sphere's center and radius (mm)."""
+"""The unknowns: rotation (rad) and shift (mm) of the probe on the flange, center and radius of the sphere (mm)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,9 +23,9 @@ class Views:
     """The points of all views, one row each.
 
     Attributes:
-        view: `(m,)` which view each point belongs to.
-        R: `(m, 3, 3)` direction of the flange in that view.
-        t: `(m, 3)` where the flange is.
+        view: `(m,)` view of each point.
+        R: `(m, 3, 3)` orientation of the flange in that view.
+        t: `(m, 3)` position of the flange.
         points: `(m, 3)` in frame S.
     """
 
@@ -42,14 +43,14 @@ class Views:
 
 @dataclass(frozen=True, eq=False)
 class ProbeFit:
-    """Where a fit ended.
+    """The result of a fit.
 
     Attributes:
-        T_FS: The probe on the flange, `(4, 4)`.
-        center: The sphere's center in the base, `(3,)`.
-        radius_mm: The sphere's radius, as given or as found.
+        T_FS: pose of the probe on the flange, `(4, 4)`.
+        center: center of the sphere in the base, `(3,)`.
+        radius_mm: radius of the sphere, as given or as found.
         heights_mm: `(m,)` height of each point above the sphere.
-        residuals: `(m,)` what was minimized: the heights, or the errors along the rays in units of the noise.
+        residuals: `(m,)` the minimized values: the heights, or the errors along the rays in units of the noise.
         jacobian: `(m, 9)` or `(m, 10)` derivatives of the residuals.
     """
 
@@ -72,10 +73,10 @@ class ProbeFit:
 
 
 class _Sphere:
-    """The points of all views against a sphere, as functions of the unknowns."""
+    """The points of all views relative to a sphere, as functions of the unknowns."""
 
     def __init__(self, views: Views, guess: FloatArray, radius_mm: float | None) -> None:
-        """Take the sphere's radius, or None where it is the tenth unknown."""
+        """Store the sphere's radius, or None if it is the tenth unknown."""
         self.lengths = np.linalg.norm(views.points, axis=1)
         self._views, self._guess, self._radius_mm = views, guess[:3, :3], radius_mm
         self._rays = views.points / self.lengths[:, np.newaxis]
@@ -84,7 +85,7 @@ class _Sphere:
         return float(unknown[9]) if self._radius_mm is None else self._radius_mm
 
     def direction(self, unknown: FloatArray) -> FloatArray:
-        """Return the direction of S on the flange, `(3, 3)`."""
+        """Return the orientation of S on the flange, `(3, 3)`."""
         return np.asarray(Rotation.from_rotvec(unknown[TURN]).as_matrix() @ self._guess)
 
     def in_base(self, unknown: FloatArray) -> FloatArray:
@@ -95,7 +96,10 @@ class _Sphere:
         return np.asarray(np.linalg.norm(self.in_base(unknown) - unknown[CENTER], axis=1) - self.radius_mm(unknown))
 
     def distances(self, unknown: FloatArray) -> FloatArray:
-        """Return where along each ray it meets the sphere; of a ray that passes by, about where it is nearest."""
+        """Return the position along each ray at which it meets the sphere.
+
+        If the ray misses, return about the nearest position.
+        """
         center_F = np.einsum("nji,nj->ni", self._views.R, unknown[CENTER] - self._views.t)
         center_S = (center_F - unknown[SHIFT]) @ self.direction(unknown)
         along = np.einsum("ni,ni->n", center_S, self._rays)
@@ -121,23 +125,23 @@ class _Sphere:
         return self.height_slopes(unknown, self._views.points)[0]
 
     def ray_jacobian(self, unknown: FloatArray) -> FloatArray:
-        """Return the derivatives of measured less modeled distances, by the implicit function |t u - c| = r."""
+        """Return the derivatives of measured minus modeled distances, by the implicit function |t u - c| = r."""
         met = self.distances(unknown)[:, np.newaxis] * self._rays
         slopes, along = self.height_slopes(unknown, met)
         return np.asarray(slopes / np.minimum(along, -_LEAST_COSINE)[:, np.newaxis])
 
 
 def fit_heights(views: Views, radius_mm: float, guess: FloatArray, center: FloatArray | None = None) -> ProbeFit:
-    """Return where a quick fit of the points' heights above the sphere comes to, from a guess of T_FS.
+    """Return the result of a fast fit of the points' heights above the sphere, from a guess of T_FS.
 
-    It converges from far away, but noise along a slanting ray moves it a little: the square of the noise over the
-    radius. `fit_rays` takes it from there.
+    It converges from far away, but noise along an oblique ray shifts it a little: the square of the noise over the
+    radius. `fit_rays` removes this shift.
 
     Args:
-        views: The points.
-        radius_mm: The sphere's radius.
-        guess: T_FS to start from.
-        center: The sphere's center to start from; the middle of the points where left out.
+        views: the points.
+        radius_mm: radius of the sphere.
+        guess: initial T_FS.
+        center: initial center of the sphere; default: the middle of the points.
     """
     sphere = _Sphere(views, guess, radius_mm)
     if center is None:
@@ -151,10 +155,10 @@ def fit_rays(views: Views, start: ProbeFit, noise_mm: float, radius_is_known: bo
     """Return the maximum-likelihood fit for noise along the rays, which start at the origin of S.
 
     Args:
-        views: The points.
-        start: A fit to start from.
-        noise_mm: Standard deviation of a point along its ray.
-        radius_is_known: Whether the radius stays as it is in `start`.
+        views: the points.
+        start: an initial fit.
+        noise_mm: standard deviation of a point along its ray.
+        radius_is_known: whether the radius of `start` is fixed.
     """
     sphere = _Sphere(views, start.T_FS, start.radius_mm if radius_is_known else None)
 
@@ -177,7 +181,7 @@ def _ended(sphere: _Sphere, end: FloatArray, residuals: FloatArray, jacobian: Fl
 
 
 def _left_jacobian(turn: FloatArray) -> FloatArray:
-    """Return how a small change of a rotation vector turns what it has turned (the left Jacobian of SO(3))."""
+    """Return the effect of a small change of a rotation vector on a rotated vector (the left Jacobian of SO(3))."""
     angle = float(np.linalg.norm(turn))
     x, y, z = turn
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

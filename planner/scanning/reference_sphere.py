@@ -1,4 +1,4 @@
-"""A reference sphere as the probe sees it: simulated measurements for the two calibrations, in closed form."""
+"""Simulated measurements of a reference sphere for the two calibrations, in closed form."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -16,16 +16,16 @@ from planner.scanning.probe_calibration import ProbeCalibration, calibrate_probe
 from planner.scanning.sphere_fit import fit_sphere
 
 _RADIUS_MM = 15.0
-# Where on the table the sphere stands for the axis; on it, turned by nothing, for the probe.
+# Position of the sphere on the table for the axis; for the probe it is on the table too, which does not turn.
 _SEAT_T_MM = (120.0, 0.0, 60.0)
 _TABLE_ANGLES = 12
-# A sweep over the sphere, in steps of the probe across its line.
+# A sweep over the sphere, in steps of the probe perpendicular to its line.
 _SWEEP_MM = np.linspace(-9.0, 9.0, 7)
 
 
 @dataclass(frozen=True, eq=False)
 class CellCalibration:
-    """What both procedures came to on one cell."""
+    """The results of both calibrations of one cell."""
 
     axis: AxisCalibration
     probe: ProbeCalibration
@@ -33,7 +33,7 @@ class CellCalibration:
 
 
 class Sweep(NamedTuple):
-    """Profiles of a sphere: the flange poses that they were taken from, and the points of each, in frame S."""
+    """Profiles of a sphere: their flange poses, and the points of each, in frame S."""
 
     T_BF: FloatArray
     points_S: list[FloatArray]
@@ -42,9 +42,10 @@ class Sweep(NamedTuple):
 def profile_of_sphere(
     probe: LaserProbe, T_BS: FloatArray, center_B: FloatArray, radius_mm: float, rng: np.random.Generator
 ) -> FloatArray:
-    """Return the points `(m, 3)` in frame S that a probe at T_BS measures of a sphere.
+    """Return the points `(m, 3)` in frame S that a probe at T_BS measures on a sphere.
 
-    A camera sees what the laser strikes: nothing else is there, and beyond the incidence limit nothing is measured.
+    A camera sees everything in the laser line: there is no other object. Beyond the incidence limit nothing is
+    measured.
     """
     rays = probe.rays()
     center = (center_B - T_BS[:3, 3]) @ T_BS[:3, :3]
@@ -63,7 +64,7 @@ def profile_of_sphere(
 def sweep(
     probe: LaserProbe, views_BS: FloatArray, T_FS: FloatArray, center_B: FloatArray, rng: np.random.Generator
 ) -> Sweep:
-    """Return profiles of the sphere from each of the poses `(n, 4, 4)`, moved across the line in small steps."""
+    """Return profiles of the sphere from poses `(n, 4, 4)`, moved perpendicular to the line in small steps."""
     steps = np.stack([placement(0.0, step, 0.0, 0.0, 0.0, 0.0) for step in _SWEEP_MM])
     poses = (views_BS[:, np.newaxis] @ steps).reshape(-1, 4, 4)
     points = [profile_of_sphere(probe, T, center_B, _RADIUS_MM, rng) for T in poses]
@@ -71,10 +72,10 @@ def sweep(
 
 
 def views_of(center_B: FloatArray, count: int, probe: LaserProbe) -> FloatArray:
-    """Return probe poses `(count, 4, 4)` all round the upper side of a sphere, turned about their beams as well.
+    """Return probe poses `(count, 4, 4)` around the upper side of a sphere, also rotated around their beams.
 
-    The sphere is off the line's middle and at varying depth: always in the middle, the probe turned round about its
-    beam would see the same, and at one depth a turn of the probe looks like a shift.
+    The sphere is off the middle of the line and at varying depth. Otherwise a probe that rotates around its beam would
+    always measure the same. At constant depth, a rotation of the probe looks like a shift.
     """
     number = np.arange(count)
     azimuth, polar = np.radians(137.508 * number), np.radians(10.0 + 60.0 * (number + 0.5) / count)
@@ -92,14 +93,14 @@ def views_of(center_B: FloatArray, count: int, probe: LaserProbe) -> FloatArray:
 def calibrate_cell(
     true: Calibration, nominal: Calibration, probe: LaserProbe, seed: int, part: PartSize | None = None
 ) -> CellCalibration:
-    """Return what the two calibrations come to on a cell, from simulated measurements with the probe's noise.
+    """Return the results of the two calibrations of a cell, from simulated measurements with the probe's noise.
 
     Args:
-        true: The placements that the measurements are made with.
-        nominal: What is known beforehand.
-        probe: The probe.
-        seed: Chooses its noise.
-        part: What will be scanned.
+        true: placements of the measurements.
+        nominal: placements known in advance.
+        probe: the probe.
+        seed: random seed of its noise.
+        part: the part of the scan.
     """
     rng = np.random.default_rng((seed, 8))
     noise_mm = max(probe.noise_mm, 1e-3)

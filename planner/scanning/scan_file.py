@@ -1,4 +1,4 @@
-"""What a scan came to, as `scan.json`: angles in deg, lengths in mm, times in s."""
+"""The results of a scan as `scan.json`: angles in deg, lengths in mm, times in s."""
 
 import json
 from collections import Counter
@@ -13,7 +13,7 @@ _FORMAT_VERSION = 1
 
 
 def scan_document(scanned: Scanned) -> dict[str, Any]:
-    """Return a scan as JSON can hold it: what was asked, what was latched, and the error budget."""
+    """Return a scan as JSON values: its settings, the latched values, and the error budget."""
     options, run, budget = scanned.options, scanned.run, scanned.budget
     return {
         "format": _FORMAT,
@@ -56,7 +56,7 @@ def scan_document(scanned: Scanned) -> dict[str, Any]:
 
 
 def save_scan(file: Path, document: dict[str, Any]) -> None:
-    """Write a scan to `file`, which appears when it is whole."""
+    """Write a scan to `file`, which appears when it is complete."""
     write_whole(file, json.dumps(document, allow_nan=False) + "\n")
 
 

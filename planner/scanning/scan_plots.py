@@ -1,4 +1,4 @@
-"""Pictures of a scan: the part's coverage, and where the error comes from."""
+"""Plots of a scan: the coverage of the part, and the sources of the error."""
 
 import matplotlib as mpl
 import numpy as np
@@ -31,7 +31,7 @@ STATE_NAMES = {
 
 @styled()
 def coverage_figure(mesh: trimesh.Trimesh, coverage: Coverage) -> Figure:
-    """Return the part with its sample points, colored by how far they came to being measured."""
+    """Return the part with its sample points, colored by their state."""
     caster = RayCaster(mesh)
     colors = np.array([to_rgb(_STATE_COLORS[Sight(code)]) for code in coverage.codes])
     shares = coverage.shares()
@@ -51,7 +51,7 @@ def coverage_figure(mesh: trimesh.Trimesh, coverage: Coverage) -> Figure:
 
 @styled()
 def budget_figure(budget: ErrorBudget) -> Figure:
-    """Return how far each part alone moves the points, and how the distances are distributed."""
+    """Return the displacement of the points by each source alone, and the distribution of the distances."""
     figure = new_figure(3.3)
     bars, spread = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
     names = [*budget.parts, "all together"]
@@ -63,7 +63,7 @@ def budget_figure(budget: ErrorBudget) -> Figure:
         [1e3 * across for _, across in shares],
         0.36,
         color=AMBER,
-        label="of it across the surface",
+        label="of it perpendicular to the surface",
     )
     bars.set_yticks(place, names)
     bars.set_xlabel("root mean square (µm)")

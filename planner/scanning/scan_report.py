@@ -1,4 +1,4 @@
-"""A scan as one HTML page: verdict, cloud, error budget, coverage, and what went missing."""
+"""The HTML page of a scan: verdict, cloud, error budget, coverage, and missing data."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -33,20 +33,20 @@ def scan_blocks(scanned: Scanned) -> tuple[str, ...]:
     mesh, budget = scanned.scan.mesh, scanned.budget
     return (
         heading("The cloud"),
-        paragraph("Color is how far the cloud lies from the surface, averaged nearby; gray was not measured."),
+        paragraph("The color shows the distance of the cloud from the surface, averaged locally; gray: not measured."),
         figure(
             svg_of(deviation_figure(mesh, budget)),
             f"Deviation of the cloud from the surface; {_um(budget.distances.greatest)} µm at most at one point.",
         ),
         table(("", "mean (µm)", "sigma (µm)", "95 % within (µm)", "maximum (µm)"), [_distances(budget)]),
-        heading("Where the error comes from"),
+        heading("Sources of the error"),
         paragraph(_explanation(scanned)),
-        figure(svg_of(budget_figure(budget)), "What each source of error contributes; distribution of distances."),
+        figure(svg_of(budget_figure(budget)), "Contribution of each error source; distribution of distances."),
         _budget_table(budget),
         paragraph(_rounding(scanned)),
         heading("Coverage"),
         paragraph(
-            f"A place counts as seen when a profile passes within {0.5 * COVERED_MM:g} mm and can measure it there."
+            f"A place counts as seen if a profile passes within {0.5 * COVERED_MM:g} mm and can measure it there."
             " All of the surface counts, the underside too."
         ),
         figure(
@@ -62,7 +62,7 @@ def scan_blocks(scanned: Scanned) -> tuple[str, ...]:
 
 
 def verdict_of(scanned: Scanned) -> str:
-    """Return what a scan came to in one sentence."""
+    """Return the result of a scan in one sentence."""
     budget, seen = scanned.budget, scanned.coverage.shares()[Sight.SEEN]
     ended = ""
     if scanned.run.failure is not None:
@@ -72,8 +72,8 @@ def verdict_of(scanned: Scanned) -> str:
     distances, moved = budget.distances, budget.total.displacement_mm
     return (
         f"{scanned.points:,} points from {counted(len(scanned.run.numbers), 'profile')}: {_um(distances.sigma)} µm"
-        f" (1 sigma) from the surface, {_um(distances.greatest)} µm at most, {_um(moved)} µm (rms) from where they"
-        f" truly lie; {seen:.1%} of the surface seen.{ended}"
+        f" (1 sigma) from the surface, {_um(distances.greatest)} µm at most, {_um(moved)} µm (rms) from their true"
+        f" position; {seen:.1%} of the surface seen.{ended}"
     )
 
 
@@ -89,7 +89,7 @@ def _summary(scanned: Scanned) -> Iterator[tuple[str, str]]:
     yield "probe", f"{options.triggers.rate_hz:g} profiles a second, {scanned.probe.points_per_line} points each"
     yield "workpiece", f"{len(scanned.scan.mesh.faces):,} triangles"
     yield "seed", f"{options.seed}"
-    yield "if the line had died", f"{scanned.dead_line}"
+    yield "if the line had failed", f"{scanned.dead_line}"
 
 
 def _distances(budget: ErrorBudget) -> tuple[str, ...]:
@@ -99,14 +99,15 @@ def _distances(budget: ErrorBudget) -> tuple[str, ...]:
 
 def _explanation(scanned: Scanned) -> str:
     text = (
-        "The same profiles, aligned anew with one contribution alone, and with all but one. Displacement is how far a"
-        " point is from where it truly lies on the part; across the surface is the share of it that shows as a distance"
-        " from the mesh: where a surface is round about the table's axis, or lies across it, a wrong angle moves its"
-        " points along it, and the distance does not tell. Contributions that depend on one another, as a constant"
-        " backlash and the rounding of the same angle may, make the sum of the squares differ from all together."
+        "The same profiles, aligned again with one contribution only, and with all but one. Displacement is the"
+        " distance of a point from its true position on the part. Its perpendicular component is visible as a distance"
+        " from the mesh. A surface may be round around the table's axis, or perpendicular to it. Then a wrong angle"
+        " moves its points along the surface, and the distance does not show this. Contributions may depend on one"
+        " another, such as a constant backlash and the rounding of the same angle. Then the sum of the squares differs"
+        " from the total."
     )
     if not scanned.run.tells_truth:
-        text += " This port does not tell the table's true angle, so the table's own contributions are missing."
+        text += " This port does not provide the true angle of the table, so the table's own contributions are missing."
     return text
 
 
@@ -120,15 +121,15 @@ def _budget_table(budget: ErrorBudget) -> str:
         ("root of the sum of squares", _um(budget.sum_mm, 2), "", ""),
         ("all switched off", f"{_MICROMETERS * budget.none_mm:.1g}", "", ""),
     ]
-    return table(("rms", "displacement alone (µm)", "across the surface (µm)", "left without it (µm)"), rows, 3)
+    return table(("rms", "displacement alone (µm)", "perpendicular (µm)", "left without it (µm)"), rows, 3)
 
 
 def _rounding(scanned: Scanned) -> str:
     budget, decimals = scanned.budget, scanned.options.decimals
     return (
-        f"Rounding in closed form: an angle that is wrong by anything within one step of {10.0**-decimals:g} deg has"
-        f" sigma {10.0**-decimals:g}/sqrt(12) deg, which at these points' radius of {budget.radius_mm:.1f} mm (rms)"
-        f" is {_um(budget.rounding_mm, 2)} µm."
+        f"Rounding in closed form: an angle error within one step of {10.0**-decimals:g} deg has"
+        f" sigma {10.0**-decimals:g}/sqrt(12) deg. At the points' radius of {budget.radius_mm:.1f} mm (rms)"
+        f" this is {_um(budget.rounding_mm, 2)} µm."
     )
 
 
@@ -142,7 +143,7 @@ def _coverage(scanned: Scanned) -> Iterator[tuple[str, str, str]]:
 def _calibration(scanned: Scanned) -> str:
     axis, probe = scanned.knowledge.axis, scanned.knowledge.probe
     if axis is None or probe is None:
-        return paragraph("The placements of the scan file were taken as exactly known.")
+        return paragraph("The placements of the scan file were assumed to be exact.")
     wrong = f"{probe.wrong_starts} of {probe.starts} starts ended in a false minimum"
     radius = f"the sphere's radius fits as {probe.fitted_radius_mm:.4f} ± {probe.radius_uncertainty_mm:.4f} mm"
     rows = [

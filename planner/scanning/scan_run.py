@@ -1,6 +1,6 @@
-"""A scan from end to end: plan, move and latch, measure, align, write, error budget.
+"""A complete scan: plan, move and latch, measure, align, write, error budget.
 
-The workpiece is measured where it truly is, at the table's true angle, and aligned with what was latched: the
+The workpiece is measured at its true position, at the true angle of the table, and aligned with the latched values. The
 difference is the error that the error budget divides among its sources.
 """
 
@@ -24,9 +24,9 @@ from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_port import CONTROL_TIMEOUT_S, open_port
 from planner.geometry.point_normals import point_normals
 from planner.geometry.thinned_cloud import ThinnedCloud
-from planner.planning.arm_check import PlannedArm, arm_fault
 from planner.planning.planners import PLANNERS
 from planner.planning.scan_planning import plan_scan
+from planner.plans.arm_check import PlannedArm, arm_fault
 from planner.scanning.alignment import Calibration
 from planner.scanning.calibration import AxisCalibration, PartSize
 from planner.scanning.coverage import Coverage
@@ -52,11 +52,11 @@ _THINNED_MM, _NORMAL_MM = 0.5, 2.5
 
 
 class ScanError(PlannerError):
-    """A scan that cannot be carried out."""
+    """A scan that cannot be performed."""
 
 
 class ScanOptions(NamedTuple):
-    """How a scan is carried out; see the options of `python -m planner scan`."""
+    """Settings of a scan; see the options of `python -m planner scan`."""
 
     port: str = "emulator://"
     baud: int = 9600
@@ -84,7 +84,7 @@ class ScanOptions(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """What the alignment knows of the cell, and from which measurements."""
+    """The placements for the alignment, and the measurements that they are from."""
 
     calibration: Calibration
     axis: AxisCalibration | None = None
@@ -92,7 +92,7 @@ class Knowledge:
 
     @classmethod
     def of(cls, scan: Scan, probe: LaserProbe, exact: bool, seed: int) -> Self:
-        """Return the cell's own placements, or what the calibrations find from a drawing that is some mm off."""
+        """Return the cell's own placements, or the calibrated ones, starting from a drawing with errors of some mm."""
         true = Calibration.of(scan.cell)
         if exact:
             return cls(true)
@@ -102,7 +102,7 @@ class Knowledge:
 
 
 def _part_size(scan: Scan) -> PartSize:
-    """Return the cylinder about the table's axis that holds the workpiece."""
+    """Return the cylinder around the table's axis that contains the workpiece."""
     on_table = np.asarray(scan.mesh.vertices) @ scan.cell.T_TW[:3, :3].T + scan.cell.T_TW[:3, 3]
     return PartSize(float(np.hypot(on_table[:, 0], on_table[:, 1]).max()), float(on_table[:, 2].max()))
 
@@ -131,7 +131,7 @@ class Scanned:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the motion and the measuring came to their ends."""
+        """Whether the motion and the measurement were completed."""
         return self.run.failure is None and not self.is_interrupted
 
 
@@ -139,7 +139,7 @@ def planned_scan(scan: Scan, configuration: str, angle_count: int, progress: Pro
     """Return the best motion for a scan.
 
     Raises:
-        ScanError: There is none that the arm can follow.
+        ScanError: there is no motion that the arm can follow.
     """
     plans = plan_scan(scan, configuration, angle_count, PLANNERS[DEFAULT_PLANNER], progress, compiled=DEFAULT_PLANNER)
     planned = plans.best
@@ -184,7 +184,7 @@ def check_motion(planned: RunInput, options: ScanOptions) -> None:
 
 
 def run_on_port(planned: RunInput, options: ScanOptions, progress: ProgressOf) -> LatchedRun:
-    """Return what was latched while the table at the port made the motion.
+    """Return the values latched while the table at the port executed the motion.
 
     Raises:
         PlannerError: The motion is refused, the port lets no trigger through, or nothing was scanned.
@@ -217,21 +217,21 @@ def _trigger_line(port: object, table: TableClient, options: ScanOptions) -> Tri
         return ProbeOnPort(simulated, conditions.rate_hz, conditions.delay_s, conditions.faults, conditions.seed)
     if options.control is None:
         raise ScanError(
-            f"{options.port}: the simulated probe has no line to trigger this table;"
+            f"{options.port}: the simulated probe cannot trigger this table;"
             " use emulator://, or an emulator with its --control channel"
         )
     return ProbeByHand(ControlChannel(options.control, CONTROL_TIMEOUT_S), table.clock)
 
 
 def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: ProgressOf) -> Scanned:
-    """Carry a scan out, write its cloud to `out`, and return what it came to.
+    """Perform a scan, write its cloud to `out`, and return the results.
 
-    Whatever interrupts it, what was scanned until then is written.
+    After an interruption, the data scanned so far are written.
 
     Raises:
-        PlannerError: It cannot be carried out, or nothing was scanned.
-        TableError: The table does not answer.
-        OSError: The folder cannot be written.
+        PlannerError: the scan cannot be performed, or nothing was scanned.
+        TableError: the table does not reply.
+        OSError: the folder cannot be written.
     """
     probe = probe_of(scan, options)
     knowledge = Knowledge.of(scan, probe, options.exact_calibration, options.seed)

@@ -1,9 +1,9 @@
-"""Score tests of a least-squares fit: do the residuals show that a parameter changed while the data were taken?
+"""Score tests of a least-squares fit: whether the residuals show a change of a parameter during the measurement.
 
-The residuals come in groups (views, table angles) in the order in which they were taken. A change multiplies the
-derivatives of some parameters by a weight for each group: 0 then 1 for a step, a straight line for a drift, 1 in one
-group for an outlier. The score statistic (Rao 1948; also called Lagrange multiplier test) needs only the fit without
-the change. It is chi-square distributed, or F distributed where the noise is estimated from the same residuals.
+The residuals are in groups (views, table angles) in the order of the measurements. A change multiplies the derivatives
+of some parameters by a weight for each group: 0 then 1 for a step, a straight line for a drift, 1 in one group for an
+outlier. The score statistic (Rao 1948; also called Lagrange multiplier test) needs only the fit without the change. It
+is chi-square distributed, or F distributed if the noise is estimated from the same residuals.
 """
 
 from typing import NamedTuple, Self
@@ -14,19 +14,19 @@ from scipy import stats
 from planner.arrays import FloatArray, IndexArray
 
 FALSE_ALARMS = 1e-3
-"""Probability that all tests of one calibration together refuse clean data."""
-# Directions that the other parameters explain to this share carry no information about a change.
+"""Probability that all tests of one calibration together refuse valid data."""
+# Directions that the other parameters explain up to this share contain no information about a change.
 _EXPLAINED = 1e-9
 
 
 class NormalEquations(NamedTuple):
-    """The normal equations of a fit, a summand for each of n groups; residuals in units of their standard deviation.
+    """The normal equations of a fit, one summand per group; residuals are in units of their standard deviation.
 
     Attributes:
         matrix: `(n, p, p)` sum of J^T J over the group's residuals.
         gradient: `(n, p)` sum of J^T r.
-        chi_square: Sum of all squared residuals.
-        freedom: Degrees of freedom: residuals less parameters.
+        chi_square: sum of all squared residuals.
+        freedom: degrees of freedom: residuals minus parameters.
     """
 
     matrix: FloatArray
@@ -36,7 +36,7 @@ class NormalEquations(NamedTuple):
 
     @classmethod
     def of(cls, residuals: FloatArray, jacobian: FloatArray, groups: IndexArray) -> Self:
-        """Return them for residuals `(m,)`, jacobian `(m, p)` and each residual's group `(m,)`, ascending from 0."""
+        """Return them for residuals `(m,)`, Jacobian `(m, p)` and each residual's group `(m,)`, ascending from 0."""
         starts = np.searchsorted(groups, np.arange(groups[-1] + 1))
         ends = np.append(starts[1:], len(groups))
         parts = [(jacobian[a:b], residuals[a:b]) for a, b in zip(starts, ends, strict=True)]
@@ -49,13 +49,13 @@ class NormalEquations(NamedTuple):
 
 
 class Change(NamedTuple):
-    """The most significant change in a series of groups.
+    """The change with the highest significance in a series of groups.
 
     Attributes:
         kind: "drift", "step" or "outlier".
-        group: The first group after the step, or the outlier; 0 for a drift.
-        statistic: By how much the change would lower chi-square.
-        p_value: Probability of a statistic this large without any change.
+        group: the first group after the step, or the outlier; 0 for a drift.
+        statistic: decrease of chi-square by the change.
+        p_value: probability of such a large statistic without a change.
     """
 
     kind: str
@@ -68,10 +68,10 @@ def find_change(fit: NormalEquations, parameters: slice, false_alarms: float, no
     """Return the change of some parameters that the residuals show, or None.
 
     Args:
-        fit: The fit without a change.
-        parameters: Which of its parameters may change.
-        false_alarms: Probability of a change in clean data (Bonferroni over all tests).
-        noise_is_known: Whether the residuals' unit is their true standard deviation.
+        fit: the fit without a change.
+        parameters: the parameters that may change.
+        false_alarms: probability of a detected change in valid data (Bonferroni over all tests).
+        noise_is_known: whether the unit of the residuals is their true standard deviation.
     """
     count = len(fit.matrix)
     places = np.arange(count)
@@ -81,7 +81,7 @@ def find_change(fit: NormalEquations, parameters: slice, false_alarms: float, no
     names = [("drift", 0), *(("step", k) for k in range(1, count)), *(("outlier", k) for k in range(count))]
     statistics, ranks = _scores(fit, parameters, weights)
     p_values = _p_values(fit, statistics, ranks, noise_is_known)
-    # Far out all p-values are 0: then the largest statistic counts.
+    # For extreme values, all p-values are 0: then the maximum statistic is used.
     worst = int(np.lexsort((-statistics, p_values))[0])
     if p_values[worst] * len(weights) >= false_alarms:
         return None

@@ -1,4 +1,4 @@
-"""Fit a sphere of known radius to points of it."""
+"""Fit a sphere of known radius to points."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 from planner.arrays import FloatArray
 from planner.scanning.calibration import CalibrationError
 
-# A sphere of known radius has three unknowns; a second center whose residual is up to this larger fits as well.
+# A sphere of known radius has three unknowns. A second center with a residual up to this much larger is ambiguous.
 _FEWEST_POINTS = 4
 _RIVAL_RATIO = 1.5
 
@@ -18,7 +18,7 @@ class SphereFit(NamedTuple):
 
     Attributes:
         center: `(3,)` in mm.
-        rms_mm: Root mean square of the points' heights above it.
+        rms_mm: root mean square of the points' heights above it.
         deviations_mm: `(3,)` standard deviation of each coordinate of the center, for heights with the given noise.
     """
 
@@ -30,15 +30,16 @@ class SphereFit(NamedTuple):
 def fit_sphere(points: FloatArray, radius_mm: float, noise_mm: float = 0.0) -> SphereFit:
     """Return the sphere of known radius through points `(m, 3)`, with its uncertainty, by least squares.
 
-    Points in one plane, as of a single profile, fit two spheres, one on each side of their plane; they are refused.
+    Points in one plane, such as those of a single profile, fit two spheres, one on each side of their plane; they are
+    refused.
 
     Args:
-        points: In mm.
-        radius_mm: The sphere's radius.
-        noise_mm: Standard deviation of the points' heights.
+        points: points in mm.
+        radius_mm: radius of the sphere.
+        noise_mm: standard deviation of the points' heights.
 
     Raises:
-        CalibrationError: There are fewer than 4 points, or two centers fit equally well.
+        CalibrationError: there are fewer than 4 points, or two centers fit equally well.
     """
     if len(points) < _FEWEST_POINTS or not np.isfinite(points).all():
         raise CalibrationError(f"a sphere's center needs at least {_FEWEST_POINTS} points, all of them finite")
@@ -54,7 +55,7 @@ def fit_sphere(points: FloatArray, radius_mm: float, noise_mm: float = 0.0) -> S
     design = np.column_stack((2.0 * (points - middle), np.ones(len(points))))
     start = middle + np.linalg.lstsq(design, np.sum((points - middle) ** 2, axis=1), rcond=None)[0][:3]
     across = np.linalg.svd(points - middle, full_matrices=False)[2][2]
-    # Where the points are nearly flat, the linear fit leaves the side open: both are tried.
+    # If the points are nearly flat, the linear fit does not determine the side: both are tried.
     offset_mm = (start - middle) @ across
     height_mm = np.sqrt(max(radius_mm**2 - np.mean(np.sum((points - middle) ** 2, axis=1)), (0.1 * radius_mm) ** 2))
     ends = [
@@ -69,8 +70,8 @@ def fit_sphere(points: FloatArray, radius_mm: float, noise_mm: float = 0.0) -> S
     ):
         a, b = (", ".join(f"{value:.2f}" for value in center) for center in (one, other))
         raise CalibrationError(
-            f"the points of the sphere lie in one plane; centers at ({a}) and ({b}) mm fit equally well:"
-            " take profiles from another place as well"
+            f"the points of the sphere lie in one plane; centers at ({a}) and ({b}) mm fit equally well;"
+            " add profiles from another position"
         )
     jacobian = np.asarray(ends[0].jac)
     deviations_mm = noise_mm * np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)))

@@ -1,8 +1,7 @@
-"""The line on which the probe tells robot and table that it takes a profile; the probe on it is simulated.
+"""The trigger line from the probe to robot and table, with a simulated probe.
 
-Once started, a laser probe runs at its own rate, whatever else goes on. The table behind a port in simulated time gets
-its edges at their exact times, between two ticks. An emulator in real time gets them over its control channel,
-when the host has time for it.
+Once started, a laser probe runs at its own rate. A table in simulated time receives the edges at their exact times,
+between two ticks. An emulator in real time receives them over its control channel, when the host has time for it.
 """
 
 from array import array
@@ -18,13 +17,13 @@ from protocol.bench import GroundTruth, SimulatedBench, TableStatus
 
 
 class TriggerFaults(NamedTuple):
-    """Numbers of the triggers that go wrong on the way.
+    """Numbers of the triggers with faults.
 
     Attributes:
-        table_misses: The table does not hear them.
-        table_doubles: The table hears another edge after them, half a period later.
-        robot_misses: The robot does not hear them.
-        robot_doubles: The robot hears another edge after them, half a period later.
+        table_misses: the table does not detect them.
+        table_doubles: the table detects another edge after them, half a period later.
+        robot_misses: the robot does not detect them.
+        robot_doubles: the robot detects another edge after them, half a period later.
     """
 
     table_misses: frozenset[int] = frozenset()
@@ -34,16 +33,16 @@ class TriggerFaults(NamedTuple):
 
 
 class TableTruth(NamedTuple):
-    """What is not visible on the wire, `(n,)` each, by number of the trigger; NaN where there is nothing.
+    """Ground truth that is not transmitted, `(n,)` each, by number of the trigger; NaN if there is none.
 
-    The table's own angle has the zero of its encoder: where the middle of count 0 is, and the teeth are in the middle
-    of the backlash.
+    The true angle of the table has the zero of its encoder: the middle of count 0, with the teeth in the middle of the
+    backlash.
 
     Attributes:
-        exposure_deg: The table's own angle when the profile was taken.
-        edge_deg: The same when the trigger's edge arrived at the table.
-        shaft_deg: The motor's angle at that edge, over the gear ratio.
-        latched_deg: The encoder at that edge, with all its digits.
+        exposure_deg: true angle of the table when the profile was taken.
+        edge_deg: the same when the edge of the trigger arrived at the table.
+        shaft_deg: angle of the motor at that edge, divided by the gear ratio.
+        latched_deg: encoder angle at that edge, without rounding.
     """
 
     exposure_deg: FloatArray
@@ -53,23 +52,23 @@ class TableTruth(NamedTuple):
 
 
 class TriggerLine(GroundTruth, Protocol):
-    """What a motion under way sees of the probe: a `trigger` to pull, and a look at the table."""
+    """The probe during a motion: a method `trigger`, and access to the ground truth of the table."""
 
     def times_s(self) -> FloatArray:
-        """Return when each profile was taken so far, by the clock of the table's port."""
+        """Return the times of the profiles so far, by the clock of the table's port."""
         ...
 
     def stop(self) -> None:
-        """Fire no more."""
+        """Stop the triggers."""
         ...
 
     def truth(self) -> TableTruth | None:
-        """Return where the table truly was at each trigger; None where the port does not tell."""
+        """Return the true angles of the table at each trigger; None if the port does not provide them."""
         ...
 
 
 class ProbeOnPort:
-    """A probe that runs by itself, wired to the table behind a port in simulated time."""
+    """A probe that runs on its own, connected to the table of a port in simulated time."""
 
     def __init__(
         self,
@@ -79,14 +78,14 @@ class ProbeOnPort:
         faults: TriggerFaults | None = None,
         seed: int = 0,
     ) -> None:
-        """Wire a probe to a table.
+        """Connect a probe to a table.
 
         Args:
-            table: The table, as its port carries it.
-            rate_hz: Profiles a second.
-            delay_s: The longest that an edge is on its way; each takes a random time up to that.
-            faults: What goes wrong on the way.
-            seed: Chooses these times.
+            table: the table of the port.
+            rate_hz: profiles per second.
+            delay_s: maximum delay of an edge; each has a random delay up to this value.
+            faults: faults of the triggers.
+            seed: random seed of the delays.
         """
         self._table = table
         self._tick_hz = float(table.facts.tick_hz)
@@ -106,11 +105,11 @@ class ProbeOnPort:
         table.observer = self._after_tick
 
     def status(self) -> TableStatus:
-        """Return where the table is at this moment."""
+        """Return the present state of the table."""
         return self._table.status()
 
     def trigger(self) -> None:
-        """Start to run, now; when it runs the probe fires by itself."""
+        """Start the probe; a running probe triggers on its own."""
         if not self._is_running:
             self._is_running = True
             self._start_s = self._table.tick / self._tick_hz
@@ -118,12 +117,12 @@ class ProbeOnPort:
             self._put_on_line(self._table.tick)
 
     def stop(self) -> None:
-        """Fire no more, and let go of the table."""
+        """Stop the triggers, and disconnect from the table."""
         self._end_s = self._table.tick / self._tick_hz
         self._table.observer = None
 
     def times_s(self) -> FloatArray:
-        """Return when each profile was taken so far, by the table's clock."""
+        """Return the times of the profiles so far, by the table's clock."""
         now_s = min(self._end_s, self._table.tick / self._tick_hz)
         if self._start_s >= now_s:
             return np.zeros(0)
@@ -131,7 +130,7 @@ class ProbeOnPort:
         return self._start_s + self._period_s * np.arange(taken, dtype=np.float64)
 
     def truth(self) -> TableTruth:
-        """Return where the table truly was at each trigger."""
+        """Return the true angles of the table at each trigger."""
         times_s = self.times_s()
         ticks = self._first_tick + np.arange(len(self._shaft_deg))
         edges_s = np.array([self._edges_s.get(number, np.nan) for number in range(len(times_s))])
@@ -146,7 +145,7 @@ class ProbeOnPort:
         )
 
     def _edges(self) -> Iterator[tuple[float, int | None]]:
-        """Yield the edges that the table hears, with the number of their trigger where they have one."""
+        """Yield the edges that the table detects, with the number of their trigger if they have one."""
         for number in count():
             time_s = self._start_s + number * self._period_s
             delay_s = self._delay_s * self._rng.random()
@@ -165,7 +164,7 @@ class ProbeOnPort:
         self._put_on_line(status.tick)
 
     def _put_on_line(self, tick: int) -> None:
-        """Put the edges of the tick that begins now on the line."""
+        """Apply the edges of the tick that starts now to the line."""
         while (at := self._next[0] * self._tick_hz - tick) < 1.0:
             self._table.trigger(max(0.0, at))
             if self._next[1] is not None:
@@ -174,15 +173,15 @@ class ProbeOnPort:
 
 
 class ProbeByHand:
-    """A probe that the host fires: an emulator that runs in real time, through a view into it."""
+    """A probe that the host triggers, for an emulator in real time with access to its ground truth."""
 
     def __init__(self, view: GroundTruth, clock: Clock) -> None:
-        """Take over a view, and the clock of the table's port."""
+        """Store the access to the ground truth, and the clock of the table's port."""
         self._view, self._clock = view, clock
         self._fired_s: list[float] = []
 
     def status(self) -> TableStatus:
-        """Return where the table is at this moment."""
+        """Return the present state of the table."""
         return self._view.status()
 
     def trigger(self) -> None:
@@ -191,24 +190,24 @@ class ProbeByHand:
         self._view.trigger()
 
     def stop(self) -> None:
-        """Do nothing: it fires when it is told."""
+        """Do nothing: the probe triggers only on request."""
 
     def times_s(self) -> FloatArray:
-        """Return when each profile was taken so far, by the clock of the table's port."""
+        """Return the times of the profiles so far, by the clock of the table's port."""
         return np.array(self._fired_s)
 
     def truth(self) -> None:
-        """Return nothing: by the time a look comes back, the table has moved on."""
+        """Return None: when a reading arrives, the table has moved on."""
 
 
 def robot_latch_times_s(times_s: FloatArray, delay_s: float, faults: TriggerFaults, seed: int) -> FloatArray:
-    """Return when the robot latches, `(m,)` ascending.
+    """Return the times at which the robot latches, `(m,)` ascending.
 
     Args:
-        times_s: `(n,)` of the triggers.
-        delay_s: The longest that an edge is on its way.
-        faults: What goes wrong on the way.
-        seed: Chooses these times.
+        times_s: `(n,)` times of the triggers.
+        delay_s: maximum delay of an edge.
+        faults: faults of the triggers.
+        seed: random seed of the delays.
     """
     delays_s = delay_s * np.random.default_rng((seed, 6)).random(len(times_s))
     heard = [time_s + delays_s[k] for k, time_s in enumerate(times_s) if k not in faults.robot_misses]

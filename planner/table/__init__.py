@@ -1,1 +1,1 @@
-"""The seventh axis: the equations of its motion (Eq. 3 to 7), its speed profile, and how both are said on the wire."""
+"""The seventh axis: the equations of its motion (Eq. 3 to 7), its speed profile, and their encoding in the protocol."""

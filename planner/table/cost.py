@@ -1,4 +1,4 @@
-"""What a path across the map costs: Eq. (5), (6) and (7)."""
+"""The cost of a path across the map: Eq. (5), (6) and (7)."""
 
 import math
 from typing import NamedTuple
@@ -15,7 +15,7 @@ class Weights(NamedTuple):
 
 
 class PathCost(NamedTuple):
-    """Eq. (7) by term. `pauses` is not in the paper: each stop of the scan is charged C_pen (`pause_cost`)."""
+    """Eq. (7) by term. `pauses` is not in the paper: each stop of the scan costs C_pen (`pause_cost`)."""
 
     acceleration: float
     speed: float
@@ -24,12 +24,12 @@ class PathCost(NamedTuple):
 
     @property
     def total(self) -> float:
-        """Eq. (7), and the pauses."""
+        """Eq. (7) plus the pauses."""
         return self.acceleration + self.speed + self.value + self.pauses
 
 
 def default_weights(limits: Limits) -> Weights:
-    """Return the weights at which the greatest acceleration, and the greatest speed, each cost 0.1 a step."""
+    """Return the weights for which the maximum acceleration and the maximum speed each cost 0.1 per step."""
     return Weights(0.1 / limits.acceleration_deg_s2**2, 0.1 / limits.speed_deg_s**2)
 
 
@@ -41,7 +41,7 @@ def acceleration_cost(weight: float, acceleration_deg_s2: float) -> float:
 
 @kernel
 def speed_cost(weight: float, next_speed_deg_s: float) -> float:
-    """Return the second term of Eq. (5) for one step: it counts the speed at the step's *end*."""
+    """Return the second term of Eq. (5) for one step: it uses the speed at the step's *end*."""
     return weight * next_speed_deg_s * next_speed_deg_s
 
 
@@ -52,7 +52,7 @@ def value_cost(value: float) -> float:
 
 
 def greatest_step_cost(weights: Weights, limits: Limits) -> float:
-    """Return what one step costs at most: both limits reached, at a location where f_R is 0."""
+    """Return the maximum cost of one step: both limits reached, at a location with f_R = 0."""
     return (
         acceleration_cost(weights.acceleration, limits.acceleration_deg_s2)
         + speed_cost(weights.speed, limits.speed_deg_s)
@@ -61,10 +61,10 @@ def greatest_step_cost(weights: Weights, limits: Limits) -> float:
 
 
 def pause_cost(weights: Weights, limits: Limits) -> float:
-    """Return C_pen of `evalpath`, for a step into the forbidden region: above the greatest cost of an allowed step."""
+    """Return C_pen of `evalpath`, for a step into the forbidden region: above the maximum cost of an allowed step."""
     return 2.0 * greatest_step_cost(weights, limits)
 
 
 def costs_overflow(weights: Weights, limits: Limits, location_count: int) -> bool:
-    """Return whether the cost of a path of so many locations may exceed what a double holds."""
+    """Return whether the cost of a path with this number of locations may overflow a double."""
     return not math.isfinite(pause_cost(weights, limits) * location_count)

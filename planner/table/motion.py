@@ -9,14 +9,14 @@ from planner.kernel import kernel
 
 
 class Limits(NamedTuple):
-    """What the table can do; the defaults are those of the paper's table and controller."""
+    """The limits of the table; the defaults are those of the paper's table and controller."""
 
     speed_deg_s: float = 40.0
     acceleration_deg_s2: float = 100.0
 
 
 class Motion(NamedTuple):
-    """A motion along n steps, as Eq. (3) and (4) have it.
+    """A motion along n steps that satisfies Eq. (3) and (4).
 
     Attributes:
         angles_deg: (n + 1,) unwrapped angle at each column.
@@ -45,7 +45,7 @@ def next_angle(angle_deg: float, speed_deg_s: float, acceleration_deg_s2: float,
 def limited_acceleration(
     speed_deg_s: float, acceleration_deg_s2: float, step_s: float, speed_limit_deg_s: float
 ) -> float:
-    """Return the acceleration, reduced where the next speed would otherwise pass the speed limit."""
+    """Return the acceleration, reduced if the next speed would otherwise exceed the speed limit."""
     speed = next_speed(speed_deg_s, acceleration_deg_s2, step_s)
     if speed > speed_limit_deg_s:
         return (speed_limit_deg_s - speed_deg_s) / step_s
@@ -58,7 +58,7 @@ def limited_acceleration(
 def swept_angles(
     angle_deg: float, speed_deg_s: float, acceleration_deg_s2: float, step_s: float
 ) -> tuple[float, float]:
-    """Return the lowest and the highest angle of one step; a table that reverses in it goes beyond both ends."""
+    """Return the minimum and maximum angle of one step; a table that reverses in it moves beyond both ends."""
     end_deg = next_angle(angle_deg, speed_deg_s, acceleration_deg_s2, step_s)
     lowest, highest = min(angle_deg, end_deg), max(angle_deg, end_deg)
     if speed_deg_s * next_speed(speed_deg_s, acceleration_deg_s2, step_s) < 0.0:
@@ -74,7 +74,7 @@ def roll_out(
     """Apply Eq. (3) and (4) from a start state.
 
     Returns:
-        The (n + 1,) angles and the (n + 1,) speeds that belong to n accelerations.
+        The (n + 1,) angles and the (n + 1,) speeds for n accelerations.
     """
     count = len(accelerations_deg_s2)
     angles, speeds = np.empty(count + 1), np.empty(count + 1)
@@ -89,7 +89,7 @@ def roll_out(
 def motion_through_angles(
     angles_deg: FloatArray, start_speed_deg_s: float, step_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Solve Eq. (3) and (4) the other way round: the one motion that meets the given angles.
+    """Solve Eq. (3) and (4) inversely: the one motion with the given angles.
 
     Args:
         angles_deg: (n + 1,) angles.

@@ -1,4 +1,4 @@
-"""What the serial line allows: which numbers can be said, and how long saying them takes."""
+"""The properties of the serial line: which numbers can be sent, and the transmission time."""
 
 import math
 from decimal import Decimal
@@ -11,18 +11,19 @@ from protocol.trapezoid import MotionCommand
 
 
 class StreamError(PlannerError):
-    """A motion that cannot be said to the table as commands."""
+    """A motion that cannot be sent to the table as commands."""
 
 
 class Wire(NamedTuple):
-    """What the commands have to pass.
+    """The serial line for the commands.
 
     Attributes:
         decimals: decimal places.
-        baud: 10 bits a byte; 0 where bytes take no time.
-        turnaround_s: from the end of a command to the start of the next beyond the time of the bytes: what driver,
-            adapter and operating system take.
-        latency_s: from the arrival of a CR to its effect: a tick of the firmware, and clocks that tell whole ticks.
+        baud: 10 bits per byte; 0 if bytes take no time.
+        turnaround_s: time from the end of a command to the start of the next, in addition to the transmission time: the
+            delays of driver, adapter and operating system.
+        latency_s: time from the arrival of a CR to its effect: a tick of the firmware, and clocks with a resolution of
+            one tick.
     """
 
     decimals: int = 1
@@ -32,43 +33,43 @@ class Wire(NamedTuple):
 
     @property
     def quantum(self) -> float:
-        """The smallest difference of two numbers."""
+        """The resolution of the numbers."""
         return float(10.0**-self.decimals)
 
     def seconds(self, byte_count: int) -> float:
-        """Return how long bytes take."""
+        """Return the transmission time of bytes."""
         return 10.0 * byte_count / self.baud if self.baud else 0.0
 
 
 def exchanges_s(wire: Wire, command: MotionCommand, before: MotionCommand | None = None) -> float:
-    """Return how long the commands of one step take with their replies, and the reading of the latch.
+    """Return the time for the commands of one step with their replies, and for the reading of the latch.
 
-    An S or an A that is the same as `before` is not sent again.
+    An S or an A that equals that of `before` is not sent again.
     """
     lines = [encode_command(Command(Verb.READ_LATCH)), command_line(Verb.MOVE_TO, command.target_deg, wire)]
     if before is None or command.speed_deg_s != before.speed_deg_s:
         lines.append(command_line(Verb.SET_SPEED, command.speed_deg_s, wire))
     if before is None or command.acceleration_deg_s2 != before.acceleration_deg_s2:
         lines.append(command_line(Verb.SET_ACCELERATION, command.acceleration_deg_s2, wire))
-    # The latch is answered with an angle about as long as P's own line, the others with OK.
+    # The reply to the latch command has an angle about as long as P's own line; the others are OK.
     replies = len(lines[1]) + (len(lines) - 1) * len(encode_reply(Ok()))
     return wire.seconds(sum(map(len, lines)) + replies) + wire.turnaround_s * len(lines)
 
 
 def command_line(verb: Verb, value: float, wire: Wire) -> bytes:
-    """Return a command as the wire carries it."""
+    """Return a command with rounded numbers, as transmitted."""
     return encode_command(Command(verb, Decimal(repr(value))), wire.decimals)
 
 
 class Grid:
-    """The numbers that a wire can say, within the limits.
+    """The numbers that can be transmitted, within the limits.
 
     Attributes:
-        quantum: the smallest difference of two numbers.
+        quantum: the resolution of the numbers.
     """
 
     def __init__(self, limits: Limits, wire: Wire) -> None:
-        """Take the numbers of `wire`; StreamError where none is within the limits."""
+        """Use the numbers of `wire`; StreamError if none is within the limits."""
         self.quantum = wire.quantum
         self._decimals = wire.decimals
         self._most_speed = self._whole(limits.speed_deg_s)
@@ -80,24 +81,24 @@ class Grid:
             )
 
     def nearest(self, value: float) -> float:
-        """Return the number nearest to a value."""
+        """Return the nearest number to a value."""
         return self._number(round(value / self.quantum))
 
     def speed(self, value: float) -> float:
-        """Return the allowed S nearest to a speed."""
+        """Return the nearest allowed S to a speed."""
         return self._number(min(max(round(value / self.quantum), 1), self._most_speed))
 
     def rate(self, value: float) -> float:
-        """Return the allowed A nearest to a rate."""
+        """Return the nearest allowed A to an acceleration."""
         return self._number(min(max(round(value / self.quantum), 1), self._most_rate))
 
     def rates_around(self, value: float) -> tuple[float, float]:
-        """Return the allowed A next below and above a rate."""
+        """Return the nearest allowed A below and above an acceleration."""
         below = math.floor(min(value / self.quantum, self._most_rate))
         return self.rate(below * self.quantum), self.rate((below + 1) * self.quantum)
 
     def rate_at_least(self, value: float) -> float:
-        """Return the smallest allowed A that is not below a rate; the greatest one where none is."""
+        """Return the smallest allowed A that is not below an acceleration; the largest one if there is none."""
         steps = value / self.quantum
         return self._number(
             min(max(math.ceil(steps - 1e-6), 1), self._most_rate) if steps < self._most_rate else self._most_rate
@@ -110,11 +111,11 @@ class Grid:
         return [self._number(n) for n in range(middle - count, middle + count + 1) if n and -most <= n <= most]
 
     def beyond(self, angle_deg: float, forward: float) -> float:
-        """Return the nearest number that is beyond an angle, in the direction `forward` (1 or -1)."""
+        """Return the nearest number beyond an angle, in the direction `forward` (1 or -1)."""
         return self._number(int(forward * (math.floor(forward * angle_deg / self.quantum + 1e-6) + 1)))
 
     def command(self, command: MotionCommand) -> MotionCommand:
-        """Return the nearest command that the wire can say."""
+        """Return the nearest command that can be transmitted."""
         target, speed, rate = command
         return MotionCommand(self.nearest(target), self.speed(speed), self.rate(rate))
 

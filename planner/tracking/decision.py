@@ -8,12 +8,11 @@ import numpy as np
 from planner.arrays import CostArray, FloatArray, IndexArray
 from planner.defaults import RAY_SHOOTING, RECEDING
 from planner.kernel import kernel
-from planner.planning.cost_to_go import CostToGo
-from planner.planning.crossing import RunArray
-from planner.planning.problem import Terms
 from planner.planning.ray_shooting import Rays, ray_accelerations, ray_cost
 from planner.planning.receding import TRIALS, OnlineStep, costs_at_rest, look_ahead, trial_cost
-from planner.table.motion import limited_acceleration
+from planner.plans.crossing import RunArray
+from planner.plans.problem import Terms
+from planner.search.cost_to_go import CostToGo
 from planner.tracking.rest_motion import NO_REST, rests_after
 from planner.tracking.revealed_map import Window
 
@@ -78,7 +77,7 @@ class RayShooting:
         self._rays = rays or Rays()
 
     def accelerations_deg_s2(self, window: Window, speed_deg_s: float) -> FloatArray:
-        """Return the paper's set, reduced where the speed would pass its limit."""
+        """Return the paper's set, and behind it the ways to brake, which cost more than any ray."""
         terms = window.terms
         rays = ray_accelerations(self._rays.rays, terms.acceleration_limit_deg_s2)
         return np.concatenate((rays, _brakings(window, speed_deg_s)))
@@ -86,10 +85,12 @@ class RayShooting:
     def step_costs(
         self, online: OnlineStep, window: Window, angle_deg: float, speed_deg_s: float, accelerations: FloatArray
     ) -> FloatArray:
-        """Return the cost of each ray."""
+        """Return the cost of each ray; the paper shoots no other, so a way to brake is the last resort."""
         nothing = CostToGo(online.grid, np.empty((0, *online.layers.shape[1:]), dtype=np.float32), 1.0)
         last = min(self._rays.horizon, window.last)
-        return _ray_costs(window.terms, last, nothing, angle_deg, speed_deg_s, accelerations)
+        costs = _ray_costs(window.terms, last, nothing, angle_deg, speed_deg_s, accelerations)
+        costs[self._rays.rays :] = np.inf
+        return costs
 
     def rest_costs(self, online: OnlineStep, window: Window, angle_deg: float) -> FloatArray:  # noqa: ARG002 - see Method
         """Return the way from the present angle."""
@@ -117,10 +118,9 @@ def safe_candidates(
     if window.last < 1:
         return
     terms = window.terms
+    most, least = (sign * terms.speed_limit_deg_s - speed_deg_s for sign in (1.0, -1.0))
     tried = method.accelerations_deg_s2(window, speed_deg_s)
-    accelerations = np.array(
-        [limited_acceleration(speed_deg_s, a, terms.step_s, terms.speed_limit_deg_s) for a in tried.tolist()]
-    )
+    accelerations = np.clip(tried, least / terms.step_s, most / terms.step_s)
     rests = rests_after(terms, window.last, angle_deg, speed_deg_s, accelerations, margin_deg)
     if (rests == NO_REST).all():
         return
@@ -139,7 +139,7 @@ def costs_of_starts(online: OnlineStep, window: Window) -> FloatArray:
 
 
 def _order(rests: IndexArray, costs: FloatArray, accelerations: FloatArray) -> list[int]:
-    """Return the safe steps by cost; where nothing is said of their cost, by their acceleration."""
+    """Return the safe steps by cost; without a known cost, by their acceleration."""
     keys = np.where(np.isfinite(costs), costs, np.inf)
     order = np.lexsort((np.where(np.isinf(keys), np.abs(accelerations), 0.0), keys))
     return [int(i) for i in order if rests[i] != NO_REST]

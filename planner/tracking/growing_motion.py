@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Iterable
 
 from planner.execution.table_motion import Leg, PauseTimes, Phase, pause_legs, stop_leg
-from planner.planning.plan import Pause
+from planner.plans.plan import Pause
 from planner.table.motion import Limits
 from planner.tracking.online_planner import Kind, State, Step
 from protocol.trapezoid import ReferenceState

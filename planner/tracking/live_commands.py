@@ -18,13 +18,13 @@ _COLUMNS_A_STEP = 4
 
 
 class Observer(Protocol):
-    """Who takes note of what a tracker does."""
+    """Observes the actions of a tracker."""
 
     def revealed(self, column: Column) -> None:
-        """Take note of a column that became known."""
+        """Record a column that became known."""
 
     def tracked(self, tracked: Tracked, seconds: float) -> None:
-        """Take note of what was decided, and how long new columns, decision and command took."""
+        """Record a decision, and the times for new columns, decision and command."""
 
 
 class LiveCommands:
@@ -44,7 +44,7 @@ class LiveCommands:
         Args:
             tracker: who decides.
             source: where locations come from.
-            observer: who takes note.
+            observer: observer of the actions.
             now_s: the time of the motion.
             wait_s: how long the table waits for a location before the scan ends.
             is_real_time: whether the table's time passes while nothing happens; if not, the source is waited for.
@@ -74,15 +74,15 @@ class LiveCommands:
         return self._tracker.begin_s(wire, latched)
 
     def latest_s(self, timed: TimedCommand) -> float:
-        """Return how late a command may be sent."""
+        """Return the maximum delay of a command."""
         return self._tracker.latest_s(timed)
 
     def sent(self, timed: TimedCommand, late_s: float) -> None:
-        """Take note that a command was sent."""
+        """Record that a command was sent."""
         self._tracker.sent(timed, late_s)
 
     def encoder_read(self, time_s: float, angle_deg: float) -> None:
-        """Take note of where the encoder was."""
+        """Record the position of the encoder."""
         self._tracker.encoder_read(time_s, angle_deg)
 
     def _take_locations(self) -> None:
@@ -124,10 +124,10 @@ class LiveCommands:
 def reveal_first_view(
     tracker: Tracker, source: PoseSource, wait_s: float, progress: Callable[[int, int], None] | None = None
 ) -> None:
-    """Let a tracker know its first view, or the whole path where that is shorter.
+    """Give a tracker its first view, or the whole path if that is shorter.
 
     Raises:
-        SourceError: the source sends what is no location, dies, or sends nothing for too long.
+        SourceError: the source sends something that is not a location, ends, or sends nothing for too long.
     """
     total = tracker.room
     while tracker.room and not source.has_ended:

@@ -18,7 +18,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.kernel import kernel
 from planner.map.config_map import column_value
-from planner.planning.problem import Terms
+from planner.plans.problem import Terms
 from planner.table.motion import next_angle, next_speed
 from planner.tracking.decision import Candidate, Method, safe_candidates
 from planner.tracking.followed_arm import FollowedArm
@@ -202,7 +202,7 @@ class OnlinePlanner:
         return None
 
     def _may_leave(self) -> bool:
-        """Tell whether enough is known to leave a rest."""
+        """Return whether enough is known to leave a rest."""
         ahead = self.revealed.last - self.state.location
         return ahead >= (1 if self.ended else self._resume_columns)
 
@@ -260,7 +260,7 @@ class OnlinePlanner:
 
 @kernel
 def may_rest(terms: Terms, column: int, angle_deg: float, margin_deg: float) -> bool:
-    """Tell whether the table may stand at an angle of a column, a margin away from what is forbidden."""
+    """Return whether the table may stand at an angle of a column, with a margin from the forbidden region."""
     for angle in (angle_deg - margin_deg, angle_deg, angle_deg + margin_deg):
         if column_value(terms.values, terms.epsilon, column, angle) <= terms.epsilon:
             return False

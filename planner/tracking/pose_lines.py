@@ -24,7 +24,7 @@ _ALLOWED = 'send a list of 6 or 16 numbers, {"location": N, "pose": [...]}, or "
 
 
 class SourceError(PathError):
-    """A source of locations that sends what is no location, or nothing any more."""
+    """A source of locations that sends something else, or nothing any more."""
 
 
 class PoseLines:
@@ -47,7 +47,7 @@ class PoseLines:
         """Take bytes as they come.
 
         Raises:
-            SourceError: a line is no location, or repeats one, or comes after the end.
+            SourceError: a line is not a location, or repeats one, or comes after the end.
         """
         *lines, self._rest = (self._rest + data).split(b"\n")
         for line in lines:
@@ -56,17 +56,17 @@ class PoseLines:
             raise SourceError(f"{self._name}: line {self._line + 1} is longer than {_LONGEST_LINE} bytes; {_ALLOWED}")
 
     def close(self) -> None:
-        """Take note that the stream has ended.
+        """Record that the stream has ended.
 
         Raises:
-            SourceError: the end marker is missing: the program died, or forgot it.
+            SourceError: the end marker is missing: the program failed, or did not send it.
         """
         if self._rest.strip():
             line, self._rest = self._rest, b""
             self._take(line)
         if not self.has_ended:
             raise SourceError(
-                f'{self._name}: ended after {self._count} location(s) without the line "end"; send it after the last'
+                f'{self._name}: ended without the line "end", at {self._count} locations; send it after the last'
             )
 
     def _take(self, line: bytes) -> None:
@@ -94,7 +94,7 @@ class PoseLines:
         number = sent["location"]
         if number != self._count or isinstance(number, bool):
             what = "repeats a location" if isinstance(number, int) and number < self._count else "leaves locations out"
-            raise SourceError(f"{where} {what}: its number is {shown(str(number))}; the next one is {self._count}")
+            raise SourceError(f"{where} {what}: its number is {shown(str(number))}; the next is {self._count}")
         return sent["pose"]
 
     def _add(self, where: str, text: str, sent: object) -> None:

@@ -1,7 +1,7 @@
 """Where scan locations come from: a path that is known, or a program's lines on stdin or a loopback TCP port.
 
-A source is read only as far as there is room in the window, so a program that sends faster than the table moves is held
-back by its pipe, and memory stays flat.
+A source is read only as far as there is space in the window. So the pipe blocks a program that sends faster than the
+table moves, and the memory stays constant.
 """
 
 import os
@@ -30,7 +30,7 @@ class PoseSource(Protocol):
         """Return up to `room` locations (4, 4), after waiting for the first at most `wait_s` of real time.
 
         Raises:
-            SourceError: what came is no location, or the source died.
+            SourceError: the line is not a location, or the source failed.
         """
 
     @property
@@ -61,6 +61,7 @@ class ProgramSource:
     def __init__(self, descriptor: int, name: str) -> None:
         """Read from an open descriptor; `name` is for messages."""
         self._descriptor, self._lines, self._is_open = descriptor, PoseLines(name), True
+        self._fault: SourceError | None = None
 
     @property
     def has_ended(self) -> bool:
@@ -68,25 +69,29 @@ class ProgramSource:
         return self._lines.has_ended and not self._lines.poses
 
     def take(self, room: int, wait_s: float = 0.0) -> list[FloatArray]:
-        """Return what has come, see `PoseSource`."""
+        """Return what has come, see `PoseSource`; what came before a fault comes first."""
         poses, until_s = self._lines.poses, time.monotonic() + wait_s
-        while len(poses) < room and self._is_open and not self._lines.has_ended:
+        while len(poses) < room and self._is_open and not self._lines.has_ended and self._fault is None:
             left_s = 0.0 if poses else max(0.0, until_s - time.monotonic())
             if not select.select([self._descriptor], [], [], left_s)[0]:
                 break
             self._read()
+        if self._fault is not None and not poses:
+            raise self._fault
         return [poses.popleft() for _ in range(min(room, len(poses)))]
 
     def _read(self) -> None:
         try:
             data = os.read(self._descriptor, _CHUNK)
+            if data:
+                self._lines.feed(data)
+            else:
+                self._is_open = False
+                self._lines.close()
         except OSError as error:
-            raise SourceError(f"poses: cannot be read ({error.strerror or error})") from error
-        if data:
-            self._lines.feed(data)
-        else:
-            self._is_open = False
-            self._lines.close()
+            self._fault = SourceError(f"poses: cannot be read ({error.strerror or error})")
+        except SourceError as error:
+            self._fault = error
 
 
 def is_program(name: str) -> bool:

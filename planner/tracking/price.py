@@ -1,11 +1,11 @@
-"""The price of not knowing: what a tracked path costs more than a plan that knows all of it."""
+"""The price of an unknown future: the additional cost of a tracked path compared with a plan for the whole path."""
 
 from dataclasses import replace
 from typing import NamedTuple
 
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import Plan
-from planner.planning.problem import Problem
+from planner.plans.plan import Plan
+from planner.plans.problem import Problem
 
 
 class Price(NamedTuple):
@@ -13,7 +13,7 @@ class Price(NamedTuple):
 
     Attributes:
         tracked: of the path as it was tracked.
-        known_from_start: of the best plan from the same start that knows the whole path.
+        known_from_start: cost of the best plan from the same start, for the whole path.
         known: of the best plan with a free start.
     """
 

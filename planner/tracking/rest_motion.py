@@ -1,16 +1,16 @@
 """Motions that come to rest within the columns in view, by equal braking, and touch nothing forbidden.
 
-They are what makes tracking safe. A step is taken only if such a motion exists from its end. After one step of such a
-motion the rest of it is one again, so from every state that is ever reached the table can come to rest, whatever
-becomes known later, or never.
+They make tracking safe. A step is taken only if such a motion exists from its end. After one step of such a motion, the
+rest of it is such a motion again. So the table can come to rest from every state that it reaches, whatever becomes
+known later.
 """
 
 import numpy as np
 
 from planner.arrays import FloatArray, IndexArray
 from planner.kernel import kernel
-from planner.planning.crossing import crossing_is_allowed
-from planner.planning.problem import Terms
+from planner.plans.crossing import crossing_is_allowed
+from planner.plans.problem import Terms
 from planner.table.motion import next_angle, next_speed, swept_angles
 
 NO_REST = -1
@@ -23,7 +23,7 @@ _ROUNDING = 1e-9
 def step_is_safe(
     terms: Terms, column: int, angle_deg: float, speed_deg_s: float, acceleration_deg_s2: float, margin_deg: float
 ) -> bool:
-    """Tell whether a step keeps the limits and stays a margin away from what is forbidden, all the way."""
+    """Return whether a step keeps the limits and stays a margin away from the forbidden region, all the way."""
     later = next_speed(speed_deg_s, acceleration_deg_s2, terms.step_s)
     if abs(later) > terms.speed_limit_deg_s + _ROUNDING:
         return False
@@ -37,7 +37,7 @@ def step_is_safe(
 def braking_steps(terms: Terms, column: int, last: int, angle_deg: float, speed_deg_s: float, margin_deg: float) -> int:
     """Return in how many steps of equal braking the table can come to rest; NO_REST where it cannot.
 
-    Of several, one with about half of the greatest deceleration is taken, else the nearest harder one, else a gentler.
+    Of several, one with about half of the maximum deceleration is taken, else the nearest harder one, else a gentler.
 
     Args:
         terms: the known columns.

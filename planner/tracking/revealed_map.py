@@ -11,12 +11,15 @@ import numpy as np
 from planner.arrays import CostArray, FloatArray
 from planner.errors import PlannerError
 from planner.map.config_map import DEFAULT_EPSILON, ConfigurationMap
-from planner.planning.cost_to_go import lay_out_columns
-from planner.planning.crossing import RunArray, free_runs, free_runs_down
-from planner.planning.problem import Problem, Terms
-from planner.planning.receding import SPEED_COUNT, OnlineStep, prepare_online_step
+from planner.planning.receding import OnlineStep, prepare_online_step
+from planner.plans.crossing import RunArray, free_runs, free_runs_down
+from planner.plans.problem import Problem, Terms
+from planner.search.cost_to_go import lay_out_columns
 from planner.table.cost import Weights
 from planner.table.motion import Limits
+
+# Of the cost-to-go: with 360 angles and 50 columns in view it takes 0.7 ms, and a path costs up to 2 % too much.
+SPEED_COUNT, JUMP_COUNT = 21, 9
 
 
 class WindowError(PlannerError):
@@ -63,7 +66,7 @@ class RevealedMap:
             raise WindowError(f"the view is {view} columns; allowed is 1 or more")
         open_columns = ConfigurationMap(np.ones((2, angle_count)))
         problem = Problem(open_columns, step_s, limits, weights, None, None)
-        self.online: OnlineStep = prepare_online_step(problem, SPEED_COUNT)
+        self.online: OnlineStep = prepare_online_step(problem, SPEED_COUNT, JUMP_COUNT)
         self.first, self.count, self._view = first, first, view
         self._terms = problem.terms
         # The columns in view are contiguous; when the room ends they move to its beginning.

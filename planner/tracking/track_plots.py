@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from planner.map.map_plots import draw_map
-from planner.planning.plan import Plan
-from planner.planning.plan_plots import draw_path
-from planner.planning.problem import Problem
+from planner.plans.plan import Plan
+from planner.plans.plan_plots import draw_path
+from planner.plans.problem import Problem
 from planner.plot_style import BLUE, EXECUTED, INK, LIMIT, VERMILION, new_figure, save_picture, styled
 from planner.tracking.online_planner import Step
 from planner.tracking.track_file import TRACK_PICTURE

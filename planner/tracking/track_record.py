@@ -8,7 +8,7 @@ import numpy as np
 
 from planner.arrays import CodeArray, FloatArray
 from planner.execution.table_motion import Phase
-from planner.planning.plan import Pause, Wait
+from planner.plans.plan import Pause, Wait
 from planner.tracking.online_planner import Kind, State, Step, Why
 from planner.tracking.tracker import Column, Tracked
 
@@ -41,15 +41,19 @@ class TrackRecord:
         self.moments: list[Step] = []
         self._steps, self._stride = 0, 1
 
+    def close(self) -> None:
+        """Let the columns go."""
+        self._file.close()
+
     def revealed(self, column: Column) -> None:
-        """Take note of a column; one that is known already replaces the earlier one."""
+        """Record a column; a column that is already known replaces the earlier one."""
         self._angle_count = len(column.values)
         self._file.seek(column.location * 9 * self._angle_count)
         self._file.write(column.values.tobytes() + column.reasons.tobytes())
         self.T_WS[column.location : column.location + 1] = [column.T_WS]
 
     def tracked(self, tracked: Tracked, seconds: float) -> None:
-        """Take note of a command, and of the step that it begins."""
+        """Record a command, and the step that it starts."""
         for column in tracked.recounted:
             self.revealed(column)
         leg = tracked.command.leg

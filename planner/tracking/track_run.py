@@ -1,24 +1,21 @@
-"""A path tracked on the table at a port, from the first view to the files that tell of it."""
+"""A path tracked on the table at a port, from the first view to the output files."""
 
 import gc
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from planner.cell.scan import Scan
-from planner.cell.scan_path import ScanPath
 from planner.defaults import RECEDING
 from planner.execution.clear_path import nearest_turns, turns_to_start
 from planner.execution.execute import Settings, bring_to, execute_commands, resting_deg
 from planner.execution.robot_motion import robot_motion
 from planner.execution.run import Duration, RunOptions
 from planner.execution.run_file import (
-    PLAN_FILE,
     RUN_RESULTS,
     RunConditions,
     StoredRun,
@@ -32,29 +29,24 @@ from planner.execution.run_verification import RunVerification, verify_run
 from planner.execution.table_motion import PauseTimes, TableMotion
 from planner.execution.table_port import CONTROL_TIMEOUT_S, ScaledClock, open_port
 from planner.kinematics.configuration import Configuration
-from planner.kinematics.joint_path import joint_speeds_deg_s
 from planner.map.config_map import ConfigurationMap
 from planner.map.map_file import MAP_FILE, save_maps
 from planner.map.map_problem import map_problem
-from planner.planning.arm_motion import ArmMotion
-from planner.planning.arm_on_path import arm_on_path
-from planner.planning.plan import Plan, make_plan
-from planner.planning.plan_file import plan_document, save_plan
-from planner.planning.problem import Problem
+from planner.plans.plan_file import PLAN_FILE, plan_document, save_plan
 from planner.table.wire import Wire
 from planner.tracking.live_commands import LiveCommands, reveal_first_view
-from planner.tracking.online_planner import State
 from planner.tracking.pose_source import PathSource, PoseSource, program_source
 from planner.tracking.price import Price, price_of_not_knowing
 from planner.tracking.track_file import TRACK_RESULTS, save_track
 from planner.tracking.track_plots import plot_track
 from planner.tracking.track_record import TrackRecord
+from planner.tracking.tracked_plan import tracked_plan
 from planner.tracking.tracker import Start, Tracker, TrackError, TrackSettings
 from protocol import TableClient
 from protocol.bench import bench_of
 from protocol.clock import WallClock
 from protocol.control_channel import ControlChannel
-from protocol.progress import ProgressOf
+from protocol.progress import Progress, ProgressOf
 
 RESULTS = (*RUN_RESULTS, PLAN_FILE, MAP_FILE, *TRACK_RESULTS)
 
@@ -88,17 +80,17 @@ class Finished(NamedTuple):
 
     Attributes:
         checked: the run, verified against what was decided.
+        price: the cost against full knowledge.
         duration: how long it took.
         record: what was decided.
         tracker: who decided.
-        price: the cost against full knowledge.
     """
 
     checked: RunVerification
+    price: Price
     duration: Duration
     record: TrackRecord
     tracker: Tracker
-    price: Price
 
 
 def track_scan(
@@ -115,7 +107,7 @@ def track_scan(
 
     Raises:
         PlannerError: there is nothing to begin with; nothing has moved.
-        TableError: the table could not be reached, or not be brought to the start.
+        TableError: the table did not reply, or did not reach the start.
         OSError: the folder cannot be written.
     """
     problem = map_problem(scan, progress_of("distance field"))
@@ -139,88 +131,76 @@ def track_scan(
     out.mkdir(parents=True, exist_ok=True)
     with _source(scan, options, say) as source:
         reveal_first_view(tracker, source, options.wait_s, progress_of("first view"))
-        start = tracker.choose_start()
-        return _on_the_table(scan, out, options, tracker, source, start, wire, progress_of)
+        job = _Job(scan, out, options, wire, tracker, source, tracker.choose_start())
+        return _tracked(job, progress_of("track"))
 
 
-def _on_the_table(
-    scan: Scan, out: Path, options: TrackOptions, tracker: Tracker, source: PoseSource, start: Start, wire: Wire,
-    progress_of: ProgressOf,
-) -> Finished:  # fmt: skip
-    run, limits = options.run, scan.limits
+class _Job(NamedTuple):
+    """A scan whose first view is known."""
+
+    scan: Scan
+    out: Path
+    options: TrackOptions
+    wire: Wire
+    tracker: Tracker
+    source: PoseSource
+    start: Start
+
+
+def _tracked(job: _Job, progress: Progress | None) -> Finished:
+    """Bring the table to the start, track, and write what happened."""
+    run, tracker, limits = job.options.run, job.tracker, job.scan.limits
     port = open_port(run.port, run.baud, run.timeout_s, run.time_scale)
-    with TableClient(port, run.timeout_s * run.time_scale, run.decimals) as table:
-        view = bench_of(port) if run.control is None else ControlChannel(run.control, CONTROL_TIMEOUT_S)
-        began_s, wall_began_s = table.clock.now_s(), time.perf_counter()
-        turns = _turns(start, resting_deg(table, wire), run.arm_is_away)
-        known = tracker.begin(start, turns)
-        observer = TrackRecord(out, State(0, start.angle_deg + 360.0 * turns, 0.0, start.joints))
-        for column in known:
-            observer.revealed(column)
-        bring_to(table, tracker.motion.start_deg, limits, wire)
-        record = Record()
-        is_real_time = isinstance(table.clock, WallClock | ScaledClock)
-        commands = LiveCommands(
-            tracker, source, observer, lambda: table.clock.now_s() - record.origin_s, options.wait_s, is_real_time
-        )
-        settings = Settings(lag_s=run.lag_s, lead_s=run.lead_s, run_on_deg=run.run_on_deg)
-        with _no_garbage_collection():
-            execute_commands(table, tracker.motion, commands, wire, settings, view, progress_of("track"), record)
-        duration = Duration(table.clock.now_s() - began_s, time.perf_counter() - wall_began_s)
-    conditions = RunConditions(
-        run.port, wire, run.lead_s, run.tolerance_deg, turns=0, pause_times=run.pause_times, run_on_deg=run.run_on_deg
-    )
-    try:
-        checked, price = _written(scan, out, conditions, tracker, observer, record, options)
-    except KeyboardInterrupt as interrupt:
-        if record.failure is not None:
-            interrupt.add_note(record.failure)
-        raise
-    return Finished(checked, duration, observer, tracker, price)
+    with ExitStack() as stack:
+        with TableClient(port, run.timeout_s * run.time_scale, run.decimals) as table:
+            view = bench_of(port) if run.control is None else ControlChannel(run.control, CONTROL_TIMEOUT_S)
+            began_s, wall_began_s = table.clock.now_s(), time.perf_counter()
+            turns = _turns(job.start, resting_deg(table, job.wire), run.arm_is_away)
+            known, record = tracker.begin(job.start, turns), Record()
+            observer = stack.enter_context(closing(TrackRecord(job.out, tracker.state)))
+            for column in known:
+                observer.revealed(column)
+            bring_to(table, tracker.motion.start_deg, limits, job.wire)
+            commands = LiveCommands(
+                tracker,
+                job.source,
+                observer,
+                lambda: table.clock.now_s() - record.origin_s,
+                job.options.wait_s,
+                is_real_time=isinstance(table.clock, WallClock | ScaledClock),
+            )
+            settings = Settings(lag_s=run.lag_s, lead_s=run.lead_s, run_on_deg=run.run_on_deg)
+            with _no_garbage_collection():
+                execute_commands(table, tracker.motion, commands, job.wire, settings, view, progress, record)
+            duration = Duration(table.clock.now_s() - began_s, time.perf_counter() - wall_began_s)
+        try:
+            return Finished(*_written(job, observer, record), duration, observer, tracker)
+        except KeyboardInterrupt as interrupt:
+            if record.failure is not None:
+                interrupt.add_note(record.failure)
+            raise
 
 
-def _written(
-    scan: Scan, out: Path, conditions: RunConditions, tracker: Tracker, observer: TrackRecord, record: Record,
-    options: TrackOptions,
-) -> tuple[RunVerification, Price]:  # fmt: skip
+def _written(job: _Job, observer: TrackRecord, record: Record) -> tuple[RunVerification, Price]:
     """Write the plan that was carried out, verify it as any plan, and write all that is known of the run."""
     if observer.location_count < 2:
         raise TrackError(record.failure or "the scan ended at its first location")
-    problem, plan, motion, tracked_scan = _plan(scan, tracker, observer)
+    out, run, tracker = job.out, job.options.run, job.tracker
+    problem, plan, motion, scan = tracked_plan(job.scan, tracker, observer)
     save_maps(out / MAP_FILE, {tracker.configuration: problem.map})
-    save_plan(out / PLAN_FILE, plan_document(tracked_scan, problem, plan, motion))
+    save_plan(out / PLAN_FILE, plan_document(scan, problem, plan, motion))
     run_input = load_run_input(out / PLAN_FILE)
-    table_motion = TableMotion(run_input.plan, scan.limits, conditions.pause_times)
-    checked = verify_run(run_input, table_motion, record, conditions.lead_s, conditions.tolerance_deg)
-    stored = StoredRun(run_input, conditions, table_motion, record)
+    conditions = RunConditions(run.port, job.wire, run.lead_s, run.tolerance_deg, 0, run.pause_times, run.run_on_deg)
+    table_motion = TableMotion(run_input.plan, scan.limits, run.pause_times)
+    checked = verify_run(run_input, table_motion, record, run.lead_s, run.tolerance_deg)
     save_run(out, run_input, conditions, table_motion, record, checked)
     save_robot(out, robot_motion(table_motion, run_input.joints_deg), record)
     price = price_of_not_knowing(problem, plan)
-    save_track(out, options.poses or "the scan's path", tracker, observer, price)
-    plot_run(stored, checked, out / "run.png")
-    plot_track(problem, plan, observer, f"{scan.name}   {options.planner}, {options.view} columns in view", out)
+    save_track(out, job.options.poses or "the scan's path", tracker, observer, price)
+    plot_run(StoredRun(run_input, conditions, table_motion, record), checked, out / "run.png")
+    title = f"{scan.name}   {job.options.planner}, {job.options.view} columns in view"
+    plot_track(problem, plan, observer, title, out)
     return checked, price
-
-
-def _plan(scan: Scan, tracker: Tracker, observer: TrackRecord) -> tuple[Problem, Plan, ArmMotion, Scan]:
-    """Return the plan that was carried out, as if it had been made at once, with its problem and its arm."""
-    T_WS = np.stack(observer.T_WS[: observer.location_count])
-    scan = replace(scan, predefined_path=ScanPath(T_WS, scan.path.step_s))
-    values, reasons = observer.columns()
-    configuration = tracker.configuration
-    metadata = dict(tracker.map_metadata(T_WS)) | {"configuration": configuration.label}
-    map_ = ConfigurationMap(values, reasons, metadata=metadata)
-    arm = arm_on_path(scan, configuration)
-    angles, speeds, accelerations = observer.motion()
-    problem = Problem(map_, scan.path.step_s, scan.limits, scan.weights, float(angles[0]), 0.0, arm)
-    plan = make_plan(problem, tracker.settings.planner, angles, speeds, accelerations, observer.pauses)
-    plan = replace(plan, waits=observer.waits)
-    joints = observer.joints()
-    joint_speeds = joint_speeds_deg_s(joints, scan.path.step_s)
-    joint_speeds[[pause.step + 1 for pause in plan.pauses]] = 0.0
-    central, _ = arm.solve(np.array([0]), angles[:1])
-    turns = np.rint((joints[0] - central[0]) / (2.0 * np.pi)).astype(np.int64)
-    return problem, plan, ArmMotion(arm.arm, joints, joint_speeds, turns), scan
 
 
 def _turns(start: Start, position_deg: float, arm_is_away: bool) -> int:

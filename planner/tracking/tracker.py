@@ -1,9 +1,8 @@
 """Track a path that becomes known while the table moves: locations and time go in, commands and joint targets come out.
 
-No I/O and no clock: `python -m planner track` and other programs call `reveal` when a location arrives and `next` when
-`begin_s` has come, send the command that is returned at its time, and report it with `sent`. The commands are encoded
-as those of `python -m planner run` are: each from where the reference is predicted to be, corrected by what the
-encoder reads.
+No I/O and no clock. `python -m planner track` and other programs call `reveal` when a location arrives, and `next` when
+`begin_s` has come. They send the returned command at its time, and report it with `sent`. The commands are encoded as
+in `python -m planner run`: each from the predicted reference, corrected by the readings of the encoder.
 """
 
 from collections import deque
@@ -39,6 +38,8 @@ DECISION_S = 0.01
 _READY_S = 0.005
 """A decision that begins later than so long before its lines is not taken."""
 _RESUME_COLUMNS = 10
+# A command that is so close to what was decided is as good as the closest one, and found sooner.
+_CLOSE_DEG = 0.02
 
 
 class TrackError(PlannerError):
@@ -53,8 +54,8 @@ class TrackSettings(NamedTuple):
         view: columns that are known ahead of the table at most.
         margin_deg: distance that the table keeps from what is forbidden.
         reconfigure: whether a pause may change the arm's configuration where the path goes on in no other way.
-        pause_times: how long the robot takes in a pause.
-        run_on_deg: how far the table may run on when the line dies.
+        pause_times: duration of the robot's actions in a pause.
+        run_on_deg: maximum angle that the table may run on if the line fails.
         lag_s: see `planner.execution.execute.Settings`, as for the next three.
         lead_s: see there.
         drift_deg: see there.
@@ -165,14 +166,14 @@ class Tracker(FollowedReference):
         configurations: Sequence[Configuration] = tuple(Configuration),
         angle_count: int = 360,
     ) -> None:
-        """Know no location yet.
+        """Start without a known location.
 
         Args:
             problem: the cell; its own locations do not count.
             step_s: time from one location to the next.
             limits: of the table.
             weights: of Eq. (5); None takes the default for the limits.
-            wire: what the commands have to pass.
+            wire: properties of the serial line.
             settings: how the path is tracked.
             configurations: those that the start is chosen among.
             angle_count: table angles of a column.
@@ -189,6 +190,7 @@ class Tracker(FollowedReference):
             raise TrackError(f"the planner is {self._settings.planner}; allowed are {', '.join(METHODS)}")
         self._problem, self._step_s, self._limits, self._weights = problem, step_s, limits, weights
         self._angle_count = angle_count
+        self._times_of_lines: dict[float, tuple[float, float]] = {}
         self._check_the_step_fits()
         self._every = ColumnRater(problem, tuple(configurations), angle_count)
         self._rater = self._every
@@ -225,7 +227,7 @@ class Tracker(FollowedReference):
         return self._settings
 
     def map_metadata(self, T_WS: FloatArray) -> Mapping[str, object]:
-        """Return what a map of locations (n, 4, 4) says of itself, but for its configuration."""
+        """Return the metadata of a map of locations (n, 4, 4), without its configuration."""
         return self._rater.metadata(T_WS)
 
     @property
@@ -253,7 +255,7 @@ class Tracker(FollowedReference):
         return column
 
     def end(self) -> None:
-        """Take note that no more locations come."""
+        """Record that no more locations come."""
         self._ended = True
         if self._planner is not None:
             self._planner.ended = True
@@ -269,7 +271,7 @@ class Tracker(FollowedReference):
             TrackError: there is none.
         """
         if self.count < 2:
-            raise TrackError(f"the path has {self.count} location(s); it must have at least 2")
+            raise TrackError(f"the number of locations of the path is {self.count}; it must be at least 2")
         values, reasons = self._every.rate(np.stack([each.goal for each in self._known]), 0)
         starts = [self._start_in(c, values[c], reasons[c]) for c in range(len(values))]
         possible = [start for start in starts if start is not None]
@@ -300,11 +302,20 @@ class Tracker(FollowedReference):
         self._planner.rehearse()
         self.motion = GrowingMotion(angle_deg, self._step_s, self._limits, self._settings.pause_times)
         self._encoder = Encoder(
-            self.motion, self._limits, self._wire, self._settings.run_on_deg, self._spacing_s(angle_deg)
+            self.motion,
+            self._limits,
+            self._wire,
+            self._settings.run_on_deg,
+            self._spacing_s(angle_deg),
+            _CLOSE_DEG,
         )
         return columns
 
-    def begin_s(self, wire: Wire, latched: MotionCommand | None) -> float | None:  # noqa: ARG002 - see `Commands`
+    def begin_s(
+        self,
+        wire: Wire | None = None,  # noqa: ARG002 - see `Commands`
+        latched: MotionCommand | None = None,  # noqa: ARG002 - the same
+    ) -> float | None:
         """Return when to ask for the next command, without lead; None when the table stops at the path's end."""
         if self._is_over:
             return None
@@ -420,13 +431,20 @@ class Tracker(FollowedReference):
     @property
     def _lines_s(self) -> float:
         """How long the lines of a command take, until its P takes effect."""
-        return exchanges_s(self._wire, self._any_command(self.motion.start_deg)) + self._wire.latency_s
-
-    def _any_command(self, angle_deg: float) -> MotionCommand:
-        return MotionCommand(-abs(angle_deg) - 1000.0, *self._limits)
+        return self._line_times(self.motion.start_deg)[0]
 
     def _spacing_s(self, angle_deg: float) -> float:
-        return spacing_s(angle_deg, self._limits, self._wire) + DECISION_S
+        """Return how long before the end of a step its command has to take effect at the latest."""
+        return self._line_times(angle_deg)[1]
+
+    def _line_times(self, angle_deg: float) -> tuple[float, float]:
+        """Return both, which depend on the digits of the angle alone."""
+        farthest_deg = 10.0 ** len(str(int(abs(angle_deg) + 1000.0))) - 1.0
+        if farthest_deg not in self._times_of_lines:
+            lines_s = exchanges_s(self._wire, MotionCommand(-farthest_deg, *self._limits)) + self._wire.latency_s
+            between_s = spacing_s(farthest_deg - 1000.0, self._limits, self._wire) + DECISION_S
+            self._times_of_lines[farthest_deg] = lines_s, between_s
+        return self._times_of_lines[farthest_deg]
 
     def _check_the_step_fits(self) -> None:
         needed_s = self._spacing_s(0.0)

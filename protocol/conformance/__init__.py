@@ -1,1 +1,1 @@
-"""The conformance kit: one suite for the emulator and for a real table, case by clause of the specification."""
+"""The conformance kit: one suite for the emulator and for a real table, with cases for each clause."""

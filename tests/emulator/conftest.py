@@ -14,11 +14,11 @@ from tests.emulator.fault_bench import Bench
 from tests.emulator.quiet_stand import QuietStand
 
 PATIENCE_S = 20.0
-"""How long to wait for what should come at once: only a failing test ever does."""
+"""Timeout for what should come at once; only a failing test reaches it."""
 
 
-class StandIn:
-    """A running `python -m emulator`; it is ended, and must end well, when its test is over."""
+class EmulatorProcess:
+    """A running `python -m emulator`. It is ended after its test, and must end without an error."""
 
     def __init__(self, arguments: tuple[str, ...], stderr_path: Path) -> None:
         self._stderr_path = stderr_path
@@ -56,12 +56,12 @@ def wait_until(condition: Callable[[], bool]) -> None:
 
 
 @pytest.fixture
-def stand_in(tmp_path: Path) -> Iterator[Callable[..., StandIn]]:
+def start_emulator(tmp_path: Path) -> Iterator[Callable[..., EmulatorProcess]]:
     """Start emulators with the given arguments."""
-    started: list[StandIn] = []
+    started: list[EmulatorProcess] = []
 
-    def start(*arguments: str) -> StandIn:
-        started.append(StandIn(arguments, tmp_path / f"stderr{len(started)}"))
+    def start(*arguments: str) -> EmulatorProcess:
+        started.append(EmulatorProcess(arguments, tmp_path / f"stderr{len(started)}"))
         return started[-1]
 
     yield start
@@ -76,13 +76,13 @@ def _wait_until() -> Callable[[Callable[[], bool]], None]:
 
 @pytest.fixture
 def warnings() -> list[str]:
-    """What a port said to the person who runs the emulator; its `append` is the port's `warn`."""
+    """The warnings of a port to the user of the emulator; its `append` is the port's `warn`."""
     return []
 
 
 @pytest.fixture
 def opened() -> Iterator[Callable[[str], int]]:
-    """Open devices as any program would, and close what is still open afterwards."""
+    """Open devices as any program would, and close those that are still open afterwards."""
     descriptors: list[int] = []
 
     def open_device(name: str) -> int:
@@ -99,7 +99,7 @@ def opened() -> Iterator[Callable[[str], int]]:
 
 @pytest.fixture
 def bench() -> Bench:
-    """A table for faults to strike, with its port and its client."""
+    """A table for fault injection, with its port and its client."""
     return Bench()
 
 
@@ -117,7 +117,7 @@ def folder() -> Iterator[Path]:
 
 @pytest.fixture
 def served(folder: Path, stand: QuietStand) -> Iterator[Path]:
-    """The path of a control channel that is served until the test is over."""
+    """The path of a control channel that is served until the end of the test."""
     control = ControlSocket(folder / "control")
     ended = threading.Event()
 

@@ -1,4 +1,4 @@
-"""A table in virtual time with its port and its client, for faults to strike."""
+"""A table in virtual time with its port and its client, for fault injection."""
 
 from emulator.faults.fault import fault_from
 from emulator.protocol_emulator import Serial
@@ -6,7 +6,7 @@ from protocol import TableClient
 
 
 class Bench:
-    """A table, its port, and a client that has found its place."""
+    """A table, its port, and a client that has resynchronized."""
 
     def __init__(self, url: str = "emulator://") -> None:
         self.port = Serial(url, timeout=1)

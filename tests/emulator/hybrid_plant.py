@@ -15,7 +15,7 @@ Solved = Any  # scipy ships no types
 
 
 class Mode(NamedTuple):
-    """What the equations of motion depend on: the flank in contact, and which way either side turns (0: stuck)."""
+    """The state of the equations of motion: the flank in contact, and the direction of either side (0: stuck)."""
 
     contact: int
     motor_direction: int
@@ -35,7 +35,7 @@ class Event:
 
 
 class Leg(NamedTuple):
-    """What a stretch of constant voltage and load led to; speeds and accelerations as the motor would have them."""
+    """The result of a segment of constant voltage and load; speeds and accelerations are at the motor."""
 
     state: NDArray[np.float64]
     events: int
@@ -44,7 +44,7 @@ class Leg(NamedTuple):
 
 
 class HybridPlant:
-    """The plant as a textbook has it: five states, a mode, and events that end the mode at their exact instant."""
+    """The plant from a textbook: five states, a mode, and events that end the mode at their exact instant."""
 
     def __init__(self, config: TableConfig, voltage_V: float, load_torque_Nm: float) -> None:
         self.motor, self.gears, self.friction = config.motor, config.gears, config.friction
@@ -55,7 +55,7 @@ class HybridPlant:
         self.voltage_V, self.load_Nm = voltage_V, load_torque_Nm
 
     def torque_ratio(self, contact: int, direction: int) -> float:
-        """Return the torque at the motor for one at the table; the driven side pays for the gears' losses."""
+        """Return the torque at the motor for a torque at the table; the driven side includes the gears' losses."""
         efficiency = self.gears.efficiency
         return (1.0 / efficiency if direction == contact else efficiency) / self.gears.ratio
 
@@ -100,11 +100,11 @@ class HybridPlant:
         return Mode(0, int(np.sign(state[1])) or self.breakaway(0, state), int(np.sign(state[3]) or pushed))
 
     def breakaway(self, contact: int, state: NDArray[np.float64]) -> int:
-        torque = self.motor_torque(state) * (1.0 + 1e-6)  # what reaches the limit breaks away
+        torque = self.motor_torque(state) * (1.0 + 1e-6)  # a torque at the limit breaks away
         return next((way for way in (1, -1) if way * torque > self.holding_torque(contact, way)), 0)
 
     def mode(self, contact: int, state: NDArray[np.float64]) -> Mode:
-        """Return how the plant goes on from a state."""
+        """Return the next mode of the plant from a state."""
         if contact == 0:
             return self.free(state)
         if state[1] != 0.0:
@@ -158,7 +158,7 @@ class HybridPlant:
         return contact
 
     def collide(self, flank: int, state: NDArray[np.float64]) -> None:
-        """Let small impulses pass through the teeth until both sides have one speed."""
+        """Pass small impulses through the teeth until both sides have one speed."""
         closing = flank * (state[1] - self.gears.ratio * state[3])
         impulse = closing * self.motor_inertia * self.gears.ratio * self.gears.efficiency / 5000.0
         while flank * (state[1] - self.gears.ratio * state[3]) > 0.0:
@@ -174,7 +174,7 @@ class HybridPlant:
             state[1] = 0.0 if abs(state[1]) < 1e-7 else state[1]
             state[3] = 0.0 if abs(state[3]) < 1e-9 else state[3]
             mode = self.mode(contact, state)
-            state[4] += 1e-9 * (contact - mode.contact)  # clear of a flank that is left, or it would be met again
+            state[4] += 1e-9 * (contact - mode.contact)  # clear of a flank that is left, or the event would occur again
             events = self.events(mode)
             solved = self.solve(mode, events, (now_s, duration_s), state)
             now_s, state, contact = float(solved.t[-1]), solved.y[:, -1].copy(), mode.contact

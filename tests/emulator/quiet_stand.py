@@ -1,4 +1,4 @@
-"""An emulator that stands still, for the control channel to act on."""
+"""An emulator at rest, for tests of the control channel."""
 
 from emulator.config.table_config import load_config
 from emulator.table.table import Table
@@ -6,7 +6,7 @@ from protocol.bench import Fault
 
 
 class WatchedTable(Table):
-    """A table that stands still, with a list of what was done to it."""
+    """A table at rest, with a list of the actions on it."""
 
     def __init__(self) -> None:
         super().__init__(load_config())
@@ -26,7 +26,7 @@ class WatchedTable(Table):
 
 
 class QuietStand:
-    """The server of such a table."""
+    """The server of this table."""
 
     def __init__(self) -> None:
         self.table = WatchedTable()

@@ -1,4 +1,4 @@
-"""What tests of the running emulator share: its start, and a client that waits for answers."""
+"""Common parts of tests of the running emulator: its start, and a client that waits for replies."""
 
 import subprocess
 from collections.abc import Callable
@@ -11,8 +11,8 @@ from protocol.serial_port import open_serial_port
 WaitUntil = Callable[[Callable[[], bool]], None]
 
 
-class StandIn(Protocol):
-    """What the fixture `stand_in` starts."""
+class EmulatorProcess(Protocol):
+    """What the fixture `start_emulator` starts."""
 
     process: subprocess.Popen[str]
     port: str
@@ -23,7 +23,7 @@ class StandIn(Protocol):
     def wait_for_words(self, words: str) -> None: ...
 
 
-Start = Callable[..., StandIn]
+Start = Callable[..., EmulatorProcess]
 
 
 def open_port(url: str, baud: int = 9600) -> serial.Serial:

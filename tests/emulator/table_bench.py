@@ -1,4 +1,4 @@
-"""A table without a line to wait for, and what tests do with it."""
+"""A table with an unpaced line, and common actions of tests."""
 
 from collections.abc import Iterator
 
@@ -27,7 +27,7 @@ def until_at_rest(table: Table) -> TableStatus:
     for _ in range(1000):
         table.advance(100)
         if table.status().state in {"idle", "stalled"}:
-            table.advance(100)  # let it run out
+            table.advance(100)  # let the motor stop
             return table.status()
     raise AssertionError(f"still on its way: {table.status()}")
 

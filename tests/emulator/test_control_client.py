@@ -1,4 +1,4 @@
-"""The command line that talks to a running emulator."""
+"""The command line that controls a running emulator."""
 
 import json
 import sys

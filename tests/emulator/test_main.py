@@ -13,7 +13,7 @@ import pytest
 
 from emulator import control_client
 from emulator.trace import read_trace
-from tests.emulator.served import StandIn, Start, WaitUntil, ask, open_port, wait_for_position
+from tests.emulator.served import EmulatorProcess, Start, WaitUntil, ask, open_port, wait_for_position
 
 pytestmark = [
     pytest.mark.realtime,
@@ -22,7 +22,7 @@ pytestmark = [
 
 
 def refusal(*arguments: str) -> str:
-    """Return the one line that a start which must fail leaves on stderr."""
+    """Return the one line on stderr of a start that must fail."""
     done = subprocess.run(
         [sys.executable, "-m", "emulator", *arguments], capture_output=True, text=True, timeout=20, check=False
     )
@@ -34,12 +34,12 @@ def refusal(*arguments: str) -> str:
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_ends_it_well_and_leaves_nothing_behind(
-    stand_in: Start, tmp_path: Path, number: signal.Signals
+    start_emulator: Start, tmp_path: Path, number: signal.Signals
 ) -> None:
     if signal.getsignal(number) is signal.SIG_IGN:
         pytest.skip(f"{number.name} is ignored here, as under nohup")
     link, control, trace = tmp_path / "table", tmp_path / "control", tmp_path / "run.csv"
-    table = stand_in("--pty", "--link", str(link), "--control", str(control), "--trace", str(trace))
+    table = start_emulator("--pty", "--link", str(link), "--control", str(control), "--trace", str(trace))
     with open_port(str(link)) as port:
         assert ask(port, b"P 1") == b"OK\r"
         table.process.send_signal(number)
@@ -63,8 +63,8 @@ def test_a_table_that_nohup_started_outlives_its_terminal() -> None:
         assert table.wait(10) == 0
 
 
-def test_sigusr1_is_the_probes_trigger(stand_in: Start, wait_until: WaitUntil) -> None:
-    table = stand_in("--pty", "--time-scale", "20", "--baud", "0")
+def test_sigusr1_is_the_probes_trigger(start_emulator: Start, wait_until: WaitUntil) -> None:
+    table = start_emulator("--pty", "--time-scale", "20", "--baud", "0")
     with open_port(table.port) as port:
         ask(port, b"P 7")
         wait_for_position(port, b"H 7.0\r", wait_until)
@@ -73,16 +73,18 @@ def test_sigusr1_is_the_probes_trigger(stand_in: Start, wait_until: WaitUntil) -
         wait_until(lambda: ask(port, b"L") == b"L 7.0\r")
 
 
-def test_a_periodic_trigger_latches_by_itself(stand_in: Start, wait_until: WaitUntil) -> None:
-    table = stand_in("--pty", "--time-scale", "20", "--trigger-hz", "50")
+def test_a_periodic_trigger_latches_by_itself(start_emulator: Start, wait_until: WaitUntil) -> None:
+    table = start_emulator("--pty", "--time-scale", "20", "--trigger-hz", "50")
     with open_port(table.port) as port:
         ask(port, b"P 3")
         wait_until(lambda: ask(port, b"L") == b"L 3.0\r")
 
 
-def test_the_control_channel_acts_on_the_running_table(stand_in: Start, tmp_path: Path, wait_until: WaitUntil) -> None:
+def test_the_control_channel_acts_on_the_running_table(
+    start_emulator: Start, tmp_path: Path, wait_until: WaitUntil
+) -> None:
     control = tmp_path / "control"
-    table = stand_in("--pty", "--control", str(control), "--time-scale", "20", "--baud", "0")
+    table = start_emulator("--pty", "--control", str(control), "--time-scale", "20", "--baud", "0")
     with open_port(table.port) as port:
         ask(port, b"P 12")
         wait_for_position(port, b"H 12.0\r", wait_until)
@@ -100,8 +102,8 @@ def test_the_control_channel_acts_on_the_running_table(stand_in: Start, tmp_path
     assert not control.exists()
 
 
-def test_a_time_scale_beyond_the_machine_is_said_once_and_clients_are_still_answered(stand_in: Start) -> None:
-    table = stand_in("--pty", "--time-scale", "1e6", "--baud", "0")
+def test_a_time_scale_beyond_the_machine_is_said_once_and_clients_are_still_answered(start_emulator: Start) -> None:
+    table = start_emulator("--pty", "--time-scale", "1e6", "--baud", "0")
     with open_port(table.port) as port:
         ask(port, b"S 0.1")
         ask(port, b"P 10000")
@@ -111,8 +113,8 @@ def test_a_time_scale_beyond_the_machine_is_said_once_and_clients_are_still_answ
     assert table.stderr.count("falls behind") == 1
 
 
-def test_at_rest_it_uses_nearly_no_time(stand_in: Start) -> None:
-    table = stand_in("--pty", "--trigger-hz", "0")
+def test_at_rest_it_uses_nearly_no_time(start_emulator: Start) -> None:
+    table = start_emulator("--pty", "--trigger-hz", "0")
     stat = Path(f"/proc/{table.process.pid}/stat")
 
     def used_s() -> float:
@@ -121,7 +123,7 @@ def test_at_rest_it_uses_nearly_no_time(stand_in: Start) -> None:
 
     before_s = used_s()
     time.sleep(1.0)
-    # Well above what it takes (0.01) and well below what a loop that spins takes (1.0).
+    # Far above the normal value (0.01) and far below that of a busy loop (1.0).
     assert used_s() - before_s < 0.3
 
 
@@ -132,7 +134,7 @@ def test_a_script_that_reads_one_line_and_no_more_does_not_stop_it() -> None:
     assert process.stdout is not None
     name = process.stdout.readline().strip()
     process.stdout.close()
-    with open_port(name, 4800) as port:  # a reason to speak to nobody
+    with open_port(name, 4800) as port:  # a reason to refuse all connections
         port.write(b"H\r")
         port.baudrate = 9600
         time.sleep(0.1)
@@ -150,16 +152,16 @@ def test_a_trace_for_which_there_is_no_room_is_said_and_what_was_written_stays(t
         ask(port, b"P 10")
         _, stderr = process.communicate(timeout=10)  # the limit ends it
     assert process.returncode == 2
-    assert stderr.splitlines()[-1].endswith(f"what was written until then is in {tmp_path / 'run.csv.part'}, as CSV")
+    assert stderr.splitlines()[-1].endswith(f"the rows written so far are in {tmp_path / 'run.csv.part'}, as CSV")
     assert [path.name for path in tmp_path.iterdir()] == ["run.csv.part"]
     assert len((tmp_path / "run.csv.part").read_bytes()) in {512, 1024}  # the unit of `ulimit -f`
 
 
 def test_a_second_emulator_with_the_same_files_is_refused_and_the_first_goes_on(
-    stand_in: Start, tmp_path: Path
+    start_emulator: Start, tmp_path: Path
 ) -> None:
     link, trace = tmp_path / "table", tmp_path / "run.csv"
-    table = stand_in("--pty", "--link", str(link), "--trace", str(trace))
+    table = start_emulator("--pty", "--link", str(link), "--trace", str(trace))
     assert "another emulator" in refusal("--pty", "--link", str(link))
     assert "another emulator" in refusal("--pty", "--trace", str(trace))
     with open_port(str(link)) as port:
@@ -226,8 +228,8 @@ def test_help_shows_an_example() -> None:
     assert "example:" in done.stdout
 
 
-def stopped_for(table: StandIn, duration_s: float) -> float:
-    """Stop the process with SIGSTOP, let it go on, and return for how long it certainly stood, in seconds."""
+def stopped_for(table: EmulatorProcess, duration_s: float) -> float:
+    """Stop the process with SIGSTOP, continue it, and return the minimum duration of the stop, in seconds."""
     state = Path(f"/proc/{table.process.pid}/stat")
     table.process.send_signal(signal.SIGSTOP)
     while state.read_text().rpartition(")")[2].split()[0] != "T":
@@ -241,10 +243,10 @@ def stopped_for(table: StandIn, duration_s: float) -> float:
 
 @pytest.mark.parametrize("command", [b"H", b"P 100"], ids=["at rest", "in motion"])
 def test_a_long_stop_of_the_process_is_left_out_at_rest_and_in_motion(
-    stand_in: Start, tmp_path: Path, command: bytes
+    start_emulator: Start, tmp_path: Path, command: bytes
 ) -> None:
     control = tmp_path / "control"
-    table = stand_in("--pty", "--control", str(control))
+    table = start_emulator("--pty", "--control", str(control))
     with open_port(table.port) as port:
         assert ask(port, b"S 2") == b"OK\r"
         ask(port, command)
@@ -252,17 +254,17 @@ def test_a_long_stop_of_the_process_is_left_out_at_rest_and_in_motion(
         before_s, before = time.monotonic(), control_client.request(control, "state")
         stood_s = stopped_for(table, 0.8)
         table.wait_for_words("simulated time falls behind")
-        time.sleep(0.1)  # in which a clock that is ahead would be caught up with
+        time.sleep(0.1)  # time to catch up if the clock were ahead
         after, after_s = control_client.request(control, "state"), time.monotonic()
     passed_s = (after["tick"] - before["tick"]) / 1000
-    assert passed_s <= after_s - before_s - stood_s + 0.001  # not even half a second is made up for
+    assert passed_s <= after_s - before_s - stood_s + 0.001  # not even half a second is caught up
     speed_deg_s = 2.0 if command == b"P 100" else 0.0
     assert after["reference_deg"] - before["reference_deg"] == pytest.approx(speed_deg_s * passed_s, abs=1e-3)
 
 
-def test_a_short_stop_of_the_process_is_made_up_for(stand_in: Start, tmp_path: Path) -> None:
+def test_a_short_stop_of_the_process_is_made_up_for(start_emulator: Start, tmp_path: Path) -> None:
     control = tmp_path / "control"
-    table = stand_in("--pty", "--control", str(control))
+    table = start_emulator("--pty", "--control", str(control))
     before, before_s = control_client.request(control, "state"), time.monotonic()
     stopped_for(table, 0.2)
     after_s, after = time.monotonic(), control_client.request(control, "state")

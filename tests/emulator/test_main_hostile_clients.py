@@ -1,4 +1,4 @@
-"""What clients that misbehave, or die, do not do to the emulator."""
+"""Clients that misbehave or fail do not affect the emulator."""
 
 import os
 import random
@@ -21,13 +21,13 @@ pytestmark = [
 
 
 def ask_after_reopening(port: serial.Serial) -> bytes:
-    """Return the reply to H, asked again where the table saw it together with the close of the port before."""
+    """Return the reply to H, sent again if the table received it together with the close of the port."""
     reply = ask(port, b"H")
     return ask(port, b"H") if reply == b"ERR 5 bad byte\r" else reply
 
 
-def test_a_half_line_is_not_glued_to_the_next_clients_first(stand_in: Start) -> None:
-    table = stand_in("--pty")
+def test_a_half_line_is_not_glued_to_the_next_clients_first(start_emulator: Start) -> None:
+    table = start_emulator("--pty")
     half = os.open(table.port, os.O_RDWR | os.O_NOCTTY)
     os.write(half, b"P 9")
     os.close(half)
@@ -35,7 +35,7 @@ def test_a_half_line_is_not_glued_to_the_next_clients_first(stand_in: Start) -> 
     after = os.open(table.port, os.O_RDWR | os.O_NOCTTY)
     os.write(after, b"0\r")
     reply = b""
-    while not reply.endswith(b"\r"):  # what is on the wire when a client leaves may reach the next one
+    while not reply.endswith(b"\r"):  # bytes on the line when a client disconnects may reach the next one
         assert select.select([after], [], [], 10.0)[0]
         reply += os.read(after, 64)
     os.close(after)
@@ -53,15 +53,15 @@ HALVES = [
     (b"R", b" 90\r"),
     (b"P 9", b"0\r\r"),
 ]
-"""What one client leaves behind, and what would make a command of it."""
+"""Bytes that one client leaves, and bytes that would complete them to a command."""
 
 
 @pytest.mark.parametrize("baud", ["0", "9600"])
 def test_half_a_command_is_never_finished_by_the_next_client_however_fast_it_comes(
-    stand_in: Start, tmp_path: Path, baud: str
+    start_emulator: Start, tmp_path: Path, baud: str
 ) -> None:
     control = tmp_path / "control"
-    table = stand_in("--pty", "--baud", baud, "--control", str(control))
+    table = start_emulator("--pty", "--baud", baud, "--control", str(control))
     chance = random.Random(int(baud))  # noqa: S311  # a test's draw
     for _ in range(60):
         first, second = chance.choice(HALVES)
@@ -81,19 +81,21 @@ def test_half_a_command_is_never_finished_by_the_next_client_however_fast_it_com
         assert (state["reference_deg"], state["state"]) == (0.0, "idle"), (first, second)
 
 
-def test_a_client_may_come_and_go_many_times(stand_in: Start) -> None:
-    table = stand_in("--pty", "--baud", "0")
+def test_a_client_may_come_and_go_many_times(start_emulator: Start) -> None:
+    table = start_emulator("--pty", "--baud", "0")
     for _ in range(50):
         with open_port(table.port) as port:
             assert ask_after_reopening(port) == b"H 0.0\r"
     assert "two programs" not in table.stderr
 
 
-def test_random_bytes_by_the_megabyte_move_nothing(stand_in: Start, tmp_path: Path, wait_until: WaitUntil) -> None:
-    """Any bytes at any split: one reply a line, in order, and the motion that was running goes on untouched."""
+def test_random_bytes_by_the_megabyte_move_nothing(
+    start_emulator: Start, tmp_path: Path, wait_until: WaitUntil
+) -> None:
+    """Any bytes at any split: one reply per line, in order, and the running motion continues unchanged."""
     control = tmp_path / "control"
-    table = stand_in("--pty", "--baud", "0", "--time-scale", "0.01", "--control", str(control))
-    chance = random.Random(1)  # noqa: S311  # noise is no secret
+    table = start_emulator("--pty", "--baud", "0", "--time-scale", "0.01", "--control", str(control))
+    chance = random.Random(1)  # noqa: S311  # not for security
     # Without the letters that could, by chance, be a command that is to be carried out.
     harmless = sorted(set(range(256)) - set(b"PRSA"))
     noise = bytes(chance.choices(harmless, k=1 << 20))
@@ -119,8 +121,8 @@ def test_random_bytes_by_the_megabyte_move_nothing(stand_in: Start, tmp_path: Pa
         wait_for_position(port, b"H 40.0\r", wait_until)
 
 
-def test_an_unread_client_blocks_neither_commands_nor_others(stand_in: Start, wait_until: WaitUntil) -> None:
-    table = stand_in("--pty", "--baud", "0", "--tcp", "0", "--time-scale", "20")
+def test_an_unread_client_blocks_neither_commands_nor_others(start_emulator: Start, wait_until: WaitUntil) -> None:
+    table = start_emulator("--pty", "--baud", "0", "--tcp", "0", "--time-scale", "20")
     url = table.next_line()
     deaf = os.open(table.port, os.O_RDWR | os.O_NOCTTY)
     os.write(deaf, b"P 10\r")
@@ -129,14 +131,16 @@ def test_an_unread_client_blocks_neither_commands_nor_others(stand_in: Start, wa
     table.wait_for_words("does not read its replies")
     with open_port(url) as port:
         port.timeout = 0.5
-        port.read(1 << 20)  # The replies to the other are heard here too, as long as there are any.
+        port.read(1 << 20)  # The replies to the other are received here too, as long as there are any.
         wait_until(lambda: ask(port, b"H") == b"H 10.0\r")
     assert "at once" in table.stderr
     os.close(deaf)
 
 
-def test_a_client_that_floods_a_slow_line_is_made_to_wait_and_the_next_one_is_not_confused(stand_in: Start) -> None:
-    table = stand_in("--pty", "--time-scale", "20")
+def test_a_client_that_floods_a_slow_line_is_made_to_wait_and_the_next_one_is_not_confused(
+    start_emulator: Start,
+) -> None:
+    table = start_emulator("--pty", "--time-scale", "20")
     with open_port(table.port) as port:
         port.write_timeout = 0.2
         with pytest.raises(serial.SerialTimeoutException):
@@ -146,9 +150,9 @@ def test_a_client_that_floods_a_slow_line_is_made_to_wait_and_the_next_one_is_no
         assert ask(port, b"H") == b"H 0.0\r"
 
 
-def test_a_terminal_that_echoes_does_not_make_the_table_answer_itself(stand_in: Start, tmp_path: Path) -> None:
+def test_a_terminal_that_echoes_does_not_make_the_table_answer_itself(start_emulator: Start, tmp_path: Path) -> None:
     control = tmp_path / "control"
-    table = stand_in("--pty", "--control", str(control))
+    table = start_emulator("--pty", "--control", str(control))
     with open_port(table.port) as port:
         subprocess.run(["stty", "-F", table.port, "sane"], check=True)
         port.write(b"Q\r")
@@ -163,8 +167,8 @@ def test_a_terminal_that_echoes_does_not_make_the_table_answer_itself(stand_in: 
     assert (state["received_queue"], state["transmit_queue"]) == (0, 0)
 
 
-def test_a_wrong_rate_is_garbage_and_stderr_says_why(stand_in: Start) -> None:
-    table = stand_in("--pty")
+def test_a_wrong_rate_is_garbage_and_stderr_says_why(start_emulator: Start) -> None:
+    table = start_emulator("--pty")
     with open_port(table.port, 4800) as port:
         port.write(b"P 90\r")
         table.wait_for_words("set to 4800 baud and the table to 9600")
@@ -174,8 +178,8 @@ def test_a_wrong_rate_is_garbage_and_stderr_says_why(stand_in: Start) -> None:
         assert ask(port, b"H") == b"H 0.0\r"
 
 
-def test_a_client_that_is_killed_in_mid_line_leaves_a_working_table(stand_in: Start) -> None:
-    table = stand_in("--pty")
+def test_a_client_that_is_killed_in_mid_line_leaves_a_working_table(start_emulator: Start) -> None:
+    table = start_emulator("--pty")
     script = f"exec 3<>{table.port}; printf 'P 1' >&3; echo; read never_comes <&3"
     with subprocess.Popen(["sh", "-c", script], stdout=subprocess.PIPE) as client:
         assert client.stdout is not None

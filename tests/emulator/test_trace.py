@@ -131,7 +131,7 @@ def test_a_trace_that_was_cut_or_changed_is_refused_by_its_name(name: str, tmp_p
 
 @contextmanager
 def largest_file(size: int) -> Iterator[None]:
-    """Let no file of this process grow beyond a size, as on a full disk."""
+    """Limit the size of all files of this process, as on a full disk."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
@@ -163,7 +163,7 @@ def test_a_disk_that_is_full_when_an_npz_is_packed_leaves_the_run_as_csv(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(np, "savez_compressed", full)
-    with pytest.raises(TraceError, match="No space left on device; what was written"):
+    with pytest.raises(TraceError, match="No space left on device; the rows written"):
         record(tmp_path / "run.npz")
     assert [file.name for file in tmp_path.iterdir()] == ["run.npz.part"]
     assert read_trace(tmp_path / "run.npz.part").time_s[-1] == 2.1
@@ -184,7 +184,7 @@ def test_a_run_that_fails_for_another_reason_leaves_no_torn_file_under_the_name(
 def test_a_trace_that_another_writes_is_left_to_it(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     with TraceWriter(path, TICK_HZ) as first:
-        with pytest.raises(TraceError, match="another emulator writes it"):
+        with pytest.raises(TraceError, match="another emulator is writing it"):
             TraceWriter(path, TICK_HZ)
         first.record(Table(load_config()).status(), b"H", b"")
     assert read_trace(path).received == [b"H"]
@@ -209,6 +209,6 @@ def test_a_folder_cannot_become_a_trace(tmp_path: Path) -> None:
 
 def test_an_npz_is_refused_at_the_start_where_numpy_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "numpy", None)
-    with pytest.raises(TraceError, match=r"needs numpy; name a \.csv file"):
+    with pytest.raises(TraceError, match=r"needs numpy; choose a \.csv file"):
         TraceWriter(tmp_path / "run.npz", TICK_HZ)
     TraceWriter(tmp_path / "run.csv", TICK_HZ).close()

@@ -34,16 +34,19 @@ def write_rolling_scan(folder: Path, name: str, rolls_deg: Sequence[float], step
 
 
 def winding_scan(folder: Path) -> Path:
-    """Joint 6 winds up: the probe turns by 1200 deg, joint 6 can by 720. The table has to take the rest over."""
+    """Joint 6 winds up: the probe rotates by 1200 deg, joint 6 can rotate by 720.
+
+    The table has to take over the rest.
+    """
     return write_rolling_scan(folder, "winding", [30.0] * 40, step_s=1.0)
 
 
 def hasty_scan(folder: Path) -> Path:
-    """Joint 6 is too fast: 630 deg/s to and fro, of 600. The table has to take over 30 deg/s."""
+    """Joint 6 is too fast: 630 deg/s back and forth, of 600. The table has to take over 30 deg/s."""
     rolls = [0.0] * 8 + [63.0] * 10 + [0.0] * 10 + [-63.0] * 10
     return write_rolling_scan(folder, "hasty", rolls, step_s=0.1)
 
 
 def hopeless_scan(folder: Path) -> Path:
-    """No way: of 76 deg a location the table takes over 40, and joint 6 has two turns for the rest."""
+    """No plan: of 76 deg per location the table takes over 40, and joint 6 has two turns for the rest."""
     return write_rolling_scan(folder, "hopeless", [76.0] * 22, step_s=1.0)

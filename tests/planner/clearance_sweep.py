@@ -1,4 +1,4 @@
-"""Clearances from meshes that are hard to judge, beside coal: thin walls, a cavity, two bodies, holes, a knot.
+"""Clearances from difficult meshes, compared with coal: thin walls, a cavity, two bodies, holes, a knot.
 
 python -m tests.planner.clearance_sweep
 """
@@ -41,7 +41,7 @@ ARM = SCAN.cell.arm
 
 
 class Compared(NamedTuple):
-    """Our clearances and coal's `(n,)` in mm, of poses near the workpiece; -inf where a body is in it."""
+    """Our clearances and coal's `(n,)` in mm, of poses near the workpiece; -inf if a body is in it."""
 
     ours_mm: FloatArray
     true_mm: FloatArray
@@ -49,12 +49,12 @@ class Compared(NamedTuple):
 
     @property
     def above_mm(self) -> float:
-        """How far a clearance is above the true one at most."""
+        """Maximum amount by which a clearance is above the true one."""
         return float(np.max(self.ours_mm - np.maximum(self.true_mm, 0.0)))
 
     @property
     def below_mm(self) -> float:
-        """How far a clearance is below the true one at most."""
+        """Maximum amount by which a clearance is below the true one."""
         free = self.true_mm > 0.0
         return float(np.max(self.true_mm[free] - self.ours_mm[free]))
 
@@ -88,7 +88,7 @@ def compared(scan: Scan, poses: int, seed: int = 1) -> Compared:
 
 
 def coal_clearance(mesh: trimesh.Trimesh, surface: object, T_BW: FloatArray, joints: FloatArray) -> float:
-    """The distance of the arm and the probe from a mesh, -inf where the middle of one of their bodies is in it."""
+    """The distance of the arm and the probe from a mesh, -inf if the middle of one of their bodies is in it."""
     least, (lower, upper) = np.inf, np.asarray(mesh.bounds)
     for shape, pose in body_shapes(joints):
         middle = (np.linalg.inv(T_BW) @ pose)[:3, 3]
@@ -103,7 +103,7 @@ def coal_clearance(mesh: trimesh.Trimesh, surface: object, T_BW: FloatArray, joi
 
 
 def body_shapes(joints: FloatArray) -> list[tuple[object, FloatArray]]:
-    """The bodies that can meet the workpiece, and where they are in the base."""
+    """The bodies that can meet the workpiece, and their positions in the base."""
     frames, shapes = ARM.link_frames(joints[np.newaxis])[0], []
     for part in SCAN.bodies.parts:
         if part.link > 0:

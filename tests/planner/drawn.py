@@ -1,4 +1,4 @@
-"""What a figure shows at a place of its axes, read back from its pixels: what is drawn, not what was meant."""
+"""The color of a figure at a place of its axes, read back from its pixels."""
 
 from io import BytesIO
 

@@ -1,4 +1,4 @@
-"""The slow, obvious oracle: every sequence of accelerations, in plain Python, with its own formulas."""
+"""The slow, obvious reference: every sequence of accelerations, in plain Python, with its own formulas."""
 
 import itertools
 import math
@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from planner.map.config_map import ConfigurationMap
-from planner.planning.plan import Plan
-from planner.planning.problem import Problem
+from planner.plans.plan import Plan
+from planner.plans.problem import Problem
 
 SUB_STEPS = 64
 
@@ -23,7 +23,7 @@ def motion(start: tuple[float, float], accelerations: Sequence[float], step_s: f
 
 
 def is_forbidden_on_the_way(configuration_map: ConfigurationMap, plan: Plan) -> bool:
-    """Tell whether any of many sub-steps of any step outside pauses, or any column, is forbidden."""
+    """Return whether any of many sub-steps of any step outside pauses, or any column, is forbidden."""
     paused = {pause.step for pause in plan.pauses}
     for k, a in enumerate(plan.accelerations_deg_s2):
         for fraction in np.linspace(0.0, 1.0, SUB_STEPS + 1) if k not in paused else (1.0,):
@@ -36,7 +36,7 @@ def is_forbidden_on_the_way(configuration_map: ConfigurationMap, plan: Plan) -> 
 
 
 def cost_of(problem: Problem, states: Sequence[tuple[float, float]], accelerations: Sequence[float]) -> float:
-    """Return Eq. (7); infinite for a motion that is forbidden anywhere or exceeds a limit."""
+    """Return Eq. (7); infinity for a motion that is forbidden anywhere or exceeds a limit."""
     total = 0.0
     for k, a in enumerate(accelerations):
         angle, speed = states[k]
@@ -53,7 +53,7 @@ def cost_of(problem: Problem, states: Sequence[tuple[float, float]], acceleratio
 
 
 def least_cost(problem: Problem, accelerations: Sequence[float]) -> float:
-    """Return the cost of the best of all sequences of the given accelerations; infinite where none crosses."""
+    """Return the cost of the best of all sequences of the given accelerations; infinity if none crosses."""
     start = (float(problem.start_angle_deg or 0.0), float(problem.start_speed_deg_s or 0.0))
     return min(
         cost_of(problem, motion(start, sequence, problem.step_s), sequence)

@@ -1,4 +1,4 @@
-"""A port onto a simulated table that goes wrong at a chosen moment."""
+"""A port onto a simulated table that fails at a chosen time."""
 
 from collections.abc import Callable
 
@@ -9,21 +9,21 @@ Fault = Callable[[bytes], bytes]
 
 
 def hang_up(_: bytes) -> bytes:
-    """The line is dead."""
+    """The line has failed."""
     raise OSError(5, "Input/output error")
 
 
 def lose(_: bytes) -> bytes:
-    """What came is lost."""
+    """The received bytes are lost."""
     return b""
 
 
 class FaultyPort:
-    """The port of a table in virtual time; each read from `fault_s` on goes through `fault`.
+    """The port of a table in virtual time; each read from `fault_s` on uses `fault`.
 
     Attributes:
         table: the simulated table.
-        clock: its time, or what a test puts in its place.
+        clock: its time, or a replacement by a test.
     """
 
     def __init__(

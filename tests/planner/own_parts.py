@@ -1,4 +1,4 @@
-"""Parts as somebody may bring them to `new-scan`, each with the options that it needs and the class that it is."""
+"""Typical parts of users for `new-scan`, each with its options and its class."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from tests.planner.parts import bracket, circle, plate, thin_walls
 
 
 class OwnPart(NamedTuple):
-    """A part: its mesh in the unit of its file, the options of `new-scan`, and what it is taken for."""
+    """A part: its mesh in the unit of its file, the options of `new-scan`, and its expected class."""
 
     mesh: trimesh.Trimesh
     name: str

@@ -1,4 +1,4 @@
-"""Workpieces that tests make themselves, each with what makes meshes hard: thin walls, cavities, bodies, a knot."""
+"""Workpieces of the tests, each with a difficulty of meshes: thin walls, cavities, bodies, a knot."""
 
 import mapbox_earcut
 import numpy as np
@@ -8,7 +8,7 @@ from planner.arrays import FloatArray, IndexArray
 
 
 def tube(center: FloatArray, radius_mm: float, sides: int) -> trimesh.Trimesh:
-    """A round tube about a closed curve `(n, 3)`."""
+    """A round tube around a closed curve `(n, 3)`."""
     ahead = np.roll(center, -1, axis=0) - np.roll(center, 1, axis=0)
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     across = np.cross(ahead, (0.0, 0.0, 1.0))
@@ -60,7 +60,7 @@ def circle(x_mm: float, y_mm: float, radius_mm: float, count: int = 48) -> Float
 
 
 def bracket() -> trimesh.Trimesh:
-    """A base with two holes, and an upright plate with two more that stands on it: two bodies that touch."""
+    """A base with two holes, and an upright plate with two more on it: two bodies that touch."""
     base = plate(
         np.array([[-60, -40], [60, -40], [60, 40], [-60, 40.0]]), [circle(-35, -15, 9), circle(35, -15, 9)], 12.0
     )
@@ -78,14 +78,14 @@ def joined(*bodies: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def upright(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """The mesh moved to stand on z = 0 with its middle on the axis."""
+    """The mesh moved to z = 0 with its middle on the axis."""
     lower, upper = np.asarray(mesh.bounds)
     mesh.apply_translation((-(lower[0] + upper[0]) / 2, -(lower[1] + upper[1]) / 2, -lower[2]))
     return mesh
 
 
 def refined(mesh: trimesh.Trimesh, triangles: int) -> trimesh.Trimesh:
-    """The same surface in at least so many triangles."""
+    """The same surface with at least the given number of triangles."""
     while len(mesh.faces) < triangles:
         mesh = mesh.subdivide()
     return mesh

@@ -1,4 +1,4 @@
-"""A short scan to run: plan and map on disk, as the planner's commands write them."""
+"""A short scan to run: plan and map on disk, as written by the planner's commands."""
 
 import json
 from dataclasses import asdict
@@ -16,8 +16,8 @@ from planner.map.config_map import ConfigurationMap
 from planner.map.map_file import save_maps
 from planner.map.synthetic_maps import blocks_map
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import Pause, Plan, make_plan
-from planner.planning.problem import Problem
+from planner.plans.plan import Pause, Plan, make_plan
+from planner.plans.problem import Problem
 from planner.table.motion import roll_out
 
 CONFIGURATION = Configuration.parse("LEFTY-ABOVE-NOFLIP")
@@ -33,7 +33,7 @@ def scan_locations(angles_deg: FloatArray, joints_deg: FloatArray) -> FloatArray
 
 
 def short_problem() -> Problem:
-    """Return a problem whose table has to leave its place: a forbidden block comes towards it."""
+    """Return a problem whose table has to move: a forbidden block approaches it."""
     blocks = [(0, LOCATIONS - 1, 200, 240), (6, LOCATIONS - 1, 340, 359), (6, LOCATIONS - 1, 0, 4)]
     plain = blocks_map(LOCATIONS, 360, blocks, edge=6)
     about = {"configuration": CONFIGURATION.label, "digest": "short", "scan": "short", "arm": asdict(CELL.arm)}
@@ -49,7 +49,7 @@ def short_run_input() -> RunInput:
 
 
 def paused_run_input() -> RunInput:
-    """Return a scan that stops in its middle, for the table to turn by 50 degrees."""
+    """Return a scan with a pause in its middle, in which the table turns by 50 degrees."""
     problem = Problem(ConfigurationMap(np.ones((LOCATIONS, 360))), 0.1)
     accelerations = np.array([20.0] * 5 + [0.0] * (LOCATIONS - 6))
     angles, speeds = roll_out(10.0, 0.0, accelerations, 0.1)

@@ -1,4 +1,4 @@
-"""What `import planner` gives: little at first, and everything by name."""
+"""The content of `import planner`: little at first, and everything by name."""
 
 import subprocess
 import sys
@@ -17,7 +17,7 @@ def test_the_public_names_are_few_sorted_and_there() -> None:
         assert getattr(planner, name).__module__.startswith("planner.")
         assert name in dir(planner)
     with pytest.raises(AttributeError, match="has no attribute 'plna'"):
-        planner.plna  # noqa: B018  # misspelt on purpose
+        planner.plna  # noqa: B018  # misspelled deliberately
 
 
 def test_importing_the_planner_loads_nothing_that_takes_long() -> None:

@@ -1,4 +1,4 @@
-"""Planners and value factors of other packages: found by name, checked, and harmless to others when they are broken."""
+"""Planners and value factors of other packages: found by name, checked, and without effect on others when broken."""
 
 import sys
 from collections.abc import Callable
@@ -15,7 +15,7 @@ QUICK = ["--angles", "60", "--configuration", "LEFTY-ABOVE-NOFLIP"]
 MODULE = """
 import dataclasses
 import numpy as np
-from planner.planning.plan import NoPlan
+from planner.plans.plan import NoPlan
 from planner.planning.rotate_when_blocked import rotate_when_blocked
 
 def good(problem):
@@ -106,7 +106,7 @@ BROKEN = {
 
 
 def install(folder: Path, package: str, groups: dict[str, dict[str, str]]) -> None:
-    """Make a package of that name known, as an installer does."""
+    """Make a package with that name known, like an installer."""
     metadata = folder / f"{package.replace('-', '_')}-1.0.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n", encoding="utf-8")
@@ -184,7 +184,7 @@ def test_an_unknown_planner_is_refused_with_those_that_there_are(capsys: pytest.
 
 def test_two_packages_with_one_name_are_both_named(tmp_path: Path) -> None:
     install(tmp_path / "site", "other-things", {PLANNER_GROUP: {"mine": "elsewhere:plan"}})
-    with pytest.raises(PlugInError, match=r"'mine': other-things .* and own-things .* both bring one of that name"):
+    with pytest.raises(PlugInError, match=r"'mine': other-things .* and own-things .* both provide this name"):
         load_plug_in(PLANNER_GROUP, "mine")
 
 
@@ -212,7 +212,7 @@ def test_a_factor_of_another_package_counts_in_the_map_when_the_scan_names_it(tm
         ('["number"]', "factor 'number': is not a function"),
         (
             '["haf"]',
-            "factor 'haf': is not known; there are half, large, north, number, raising, scalar; did you mean",
+            "factor 'haf': not found; allowed are half, large, north, number, raising, scalar; did you mean",
         ),
         ('["half", "half"]', "value.user_factors is ['half', 'half']; it must be a list of different names"),
         ('"half"', "value.user_factors is 'half'; it must be a list of texts"),
@@ -229,6 +229,6 @@ def test_a_factor_that_cannot_count_is_refused_by_name_in_one_line(
 
 def test_a_planner_by_api_is_checked_as_well() -> None:
     scan = planner.load_scan("cylinder")
-    broken: Callable[[planner.Problem], planner.Plan] = lambda _problem: None  # type: ignore[assignment, return-value]  # noqa: E731  # broken on purpose
+    broken: Callable[[planner.Problem], planner.Plan] = lambda _problem: None  # type: ignore[assignment, return-value]  # noqa: E731  # broken deliberately
     with pytest.raises(PlugInError, match="returned None; it must return a Plan or a NoPlan"):
         planner.plan(scan, broken, "LEFTY-ABOVE-NOFLIP", 60)

@@ -52,7 +52,7 @@ def test_what_the_command_reads_from_the_former_results_is_not_overwritten(tmp_p
     write(tmp_path, run_json="a")
     set_aside(tmp_path, NAMES)
     write(tmp_path, run_json="c")
-    with pytest.raises(PlannerError, match="write to another folder"):
+    with pytest.raises(PlannerError, match="choose another folder"):
         set_aside(tmp_path, NAMES, keep=[tmp_path / "previous" / "run.json"])
     assert texts(tmp_path / "previous") == {"run.json": "a"}
     assert texts(tmp_path) == {"run.json": "c"}

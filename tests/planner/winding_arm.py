@@ -1,4 +1,4 @@
-"""Arms whose joints are simple functions of location and table angle, and the slow, obvious check of their turns."""
+"""Arms whose joints are simple functions of location and table angle, and a slow, obvious check of their turns."""
 
 import math
 from collections.abc import Sequence
@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from planner.arrays import CodeArray, FloatArray, IndexArray
 from planner.kinematics.arm import Arm
-from planner.planning.arm_on_path import ArmOnPath
-from planner.planning.joint_turns import Margin
-from planner.planning.problem import Problem
+from planner.plans.arm_on_path import ArmOnPath
+from planner.plans.problem import Problem
+from planner.search.joint_turns import Margin
 from tests.planner.exhaustive_search import cost_of, motion
 
 VIPER = Arm.load()
@@ -26,7 +26,7 @@ def winding_arm(
     turns_4: int = 0,
     zero_deg: float = 0.0,
 ) -> ArmOnPath:
-    """Return an arm whose joint 6 follows the table and turns by `twist_deg` a location; joint 4 sways or winds too.
+    """Return an arm whose joint 6 follows the table and turns by `twist_deg` per location; joint 4 moves too.
 
     Joint 6 is at 0 where table angle and twist add up to `zero_deg`.
     """
@@ -80,7 +80,7 @@ def turns_after(
 
 
 def flange_spins(wrist_deg: FloatArray) -> bool:
-    """Tell whether a wrist that goes from joints (3,) to joints (3,), in proportion, takes the flange the long way."""
+    """Return whether a wrist that moves proportionally between two joints (3,) rotates the flange the long way."""
     shares = np.linspace(0.0, 1.0, 200)[:, np.newaxis]
     quaternions = Rotation.from_euler(
         "ZYZ", wrist_deg[0] + shares * (wrist_deg[1] - wrist_deg[0]), degrees=True

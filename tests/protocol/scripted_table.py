@@ -1,6 +1,6 @@
-"""A table in virtual time, whose replies meet the fates that a test gives them.
+"""A table in virtual time, with replies that a test delays, cuts or drops.
 
-The table answers H and L with the number of lines that it has heard, so a reply tells which line it answers.
+The table answers H and L with the number of lines that it has received, so a reply identifies its line.
 """
 
 from collections import deque
@@ -22,7 +22,7 @@ from protocol import (
 )
 
 Fate = Callable[[bytes], list[tuple[float, bytes]]]
-"""What becomes of a reply: the pieces that arrive, each with its delay in seconds beyond the table's own."""
+"""The fate of a reply: the pieces that arrive, each with its delay in seconds beyond the table's own."""
 
 BYTE_S = 10 / 9600
 PROMPT_S = 0.001
@@ -131,13 +131,13 @@ class TablePort:
         return Ok()
 
     def give_fates(self, *fates: Fate) -> None:
-        """Let the next replies meet these fates, and the table be prompt from now on."""
+        """Set the fates of the next replies; later replies are on time."""
         self._fates = iter(fates)
         self._latency_s = PROMPT_S
 
 
 class MovingTablePort(TablePort):
-    """A table that turns at a constant speed to its target, and stands there."""
+    """A table that turns at a constant speed to its target, and stops there."""
 
     def __init__(self, speed_deg_s: float, target_deg: float) -> None:
         super().__init__()
@@ -157,7 +157,7 @@ class DeadPort(TablePort):
 
 
 def client_in_place(port: TablePort) -> TableClient:
-    """Return a client that has had its first answer."""
+    """Return a client that has received its first reply."""
     client = TableClient(port)
     client.position_deg()
     return client

@@ -1,4 +1,4 @@
-"""The client's verbs, what it refuses, stopping and arrival, against a table in virtual time."""
+"""The client's verbs, its errors, stopping and arrival, with a table in virtual time."""
 
 from collections.abc import Callable
 from decimal import Decimal
@@ -60,7 +60,7 @@ def test_leaving_the_block_closes_the_port() -> None:
 def test_a_refusal_tells_what_was_sent_what_came_back_and_what_to_do() -> None:
     client = client_in_place(TablePort())
     with pytest.raises(
-        CommandRefused, match=r"sent b'P 2000.0\\r', got ERR 3 out of range: ask for .* limits"
+        CommandRefused, match=r"sent b'P 2000.0\\r', got ERR 3 out of range: use a value .* limits"
     ) as refusal:
         client.move_to(2000)
     assert refusal.value.code is ErrorCode.OUT_OF_RANGE
@@ -94,7 +94,7 @@ def test_stop_is_sent_at_once_even_when_replies_are_missing() -> None:
 
 
 def stopped_at(write: Callable[[bytes], int], port: TablePort, begun_s: float) -> Callable[[bytes], int]:
-    """Return a write that ends the test once `R` was sent, without any time having passed."""
+    """Return a write that ends the test after `R` was sent, without any elapsed time."""
 
     def spy(data: bytes) -> int:
         write(data)
@@ -115,7 +115,7 @@ def test_arrival_is_two_readings_in_a_row_at_the_target() -> None:
 
 def test_a_table_that_passes_by_has_not_arrived() -> None:
     client = TableClient(MovingTablePort(speed_deg_s=10, target_deg=90))
-    with pytest.raises(ArrivalTimeout, match=r"stands at 90\.0 deg") as arrival:
+    with pytest.raises(ArrivalTimeout, match=r"the table is at 90\.0 deg") as arrival:
         client.wait_until_at(30, tolerance_deg=0.25, timeout_s=20)
     assert arrival.value.position_deg == 90
 

@@ -1,4 +1,4 @@
-"""What changes the digest of a function, and what does not: a small package is edited and read again."""
+"""Changes that affect the digest of a function, and changes that do not: a small package is edited and read again."""
 
 import importlib
 import math

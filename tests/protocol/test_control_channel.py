@@ -1,4 +1,4 @@
-"""The bench of an emulator in another process: against the emulator's server, and against other listeners."""
+"""The bench of an emulator in another process: with the emulator's server, and with other listeners."""
 
 import json
 import socket
@@ -51,7 +51,7 @@ def serving(path: Path, stand: QuietStand) -> Iterator[ControlChannel]:
 
 @contextmanager
 def answering(path: Path, answer: Callable[[socket.socket], None]) -> Iterator[None]:
-    """Let something that is no emulator answer the next client."""
+    """Let something that is not an emulator reply to the next client."""
 
     def serve() -> None:
         client, _ = listener.accept()
@@ -128,12 +128,12 @@ def test_where_nobody_listens_no_channel_is_opened(path: str, folder: Path) -> N
 def test_an_answer_of_something_else_is_never_taken_for_a_look_at_a_table(reply: bytes, folder: Path) -> None:
     with (
         answering(folder / "control", lambda client: client.sendall(reply)),
-        pytest.raises(BenchError, match="not an answer of an emulator"),
+        pytest.raises(BenchError, match="not a reply of an emulator"),
     ):
         ControlChannel(folder / "control")
 
 
-def test_a_stand_in_that_takes_nobody_in_is_not_waited_for(folder: Path) -> None:
+def test_an_emulator_that_takes_nobody_in_is_not_waited_for(folder: Path) -> None:
     with socket.socket(socket.AF_UNIX) as deaf, socket.socket(socket.AF_UNIX) as waiting:
         deaf.bind(str(folder / "control"))
         deaf.listen(0)
@@ -145,7 +145,7 @@ def test_a_stand_in_that_takes_nobody_in_is_not_waited_for(folder: Path) -> None
 def test_a_listener_that_hangs_up_is_named(folder: Path) -> None:
     with (
         answering(folder / "control", lambda _: None),
-        pytest.raises(BenchError, match="closed the connection without an answer"),
+        pytest.raises(BenchError, match="closed the connection without a reply"),
     ):
         request(folder / "control", "trigger")
 

@@ -1,4 +1,4 @@
-"""Question and answer over a line that loses, delays and spoils replies: the next answer is always the right one."""
+"""Commands and replies over a line that loses, delays and garbles replies: each command has its own reply."""
 
 from contextlib import suppress
 from decimal import Decimal
@@ -37,9 +37,9 @@ def test_a_silent_table_is_told_from_one_that_says_something_else() -> None:
 def test_a_time_out_tells_whether_the_command_was_sent() -> None:
     client = client_in_place(port := TablePort())
     port.give_fates(*[lost] * 10)
-    with pytest.raises(ReplyTimeout, match=r"sent b'P 1.0\\r', .* it may have been carried out"):
+    with pytest.raises(ReplyTimeout, match=r"sent b'P 1.0\\r', .* it may have been executed"):
         client.move_to(1)
-    with pytest.raises(ReplyTimeout, match="nothing else was sent"):
+    with pytest.raises(ReplyTimeout, match="no other command was sent"):
         client.move_to(2)
     assert Command(Verb.MOVE_TO, Decimal(2)) not in port.heard
 
@@ -163,7 +163,7 @@ def test_no_answer_is_ever_that_to_another_command(
 
 
 def say_and_check(client: TableClient, port: TablePort, what: str) -> None:
-    """Let the client say something; the answer must be that to the line which the table has heard last."""
+    """Let the client send a command; the reply must belong to the line that the table has received last."""
     match what:
         case "H":
             assert client.position_deg() == len(port.heard)
@@ -179,7 +179,7 @@ def say_and_check(client: TableClient, port: TablePort, what: str) -> None:
 
 
 class StarvedClock(VirtualClock):
-    """The clock of a program that gets the processor back two seconds after each look at it."""
+    """The clock of a program that continues two seconds after each look at it."""
 
     def now_s(self) -> float:
         self.time_s += 2.0

@@ -52,7 +52,7 @@ def test_a_reader_that_has_gone_is_one_line_and_status_2() -> None:
         assert process.stdout is not None
         process.stdout.close()
         assert process.stderr is not None
-        assert process.stderr.read() == "tool: nobody reads what it prints any more\n"
+        assert process.stderr.read() == "tool: stdout is closed\n"
     assert process.returncode == 2
 
 

@@ -1,4 +1,4 @@
-"""A program whose extra is missing says which one to install, and how."""
+"""A program with a missing extra states which one to install, and how."""
 
 import os
 import re
@@ -63,7 +63,7 @@ def run(words: list[str], environment: dict[str, str], folder: Path) -> subproce
         (["tools.identify", "fit", "trace.csv", "--out", "table.toml"], "tools.identify", "planner"),
         (["tools.plot_trace", "run.csv", "--out", "run.png"], "tools.plot_trace", "planner"),
         (["seventh-axis", "plan", "cylinder", "--out", "out"], "seventh-axis", "planner"),
-        (["seventh-axis", "tune", "--help"], "seventh-axis", "tools"),
+        (["seventh-axis", "tune", "--out", "out"], "seventh-axis", "tools"),
     ],
     ids=lambda value: "-".join(value[:2]) if isinstance(value, list) else None,
 )

@@ -1,14 +1,16 @@
-"""A file is used only where it is whole, keeps its name and is this user's own; what cannot be kept costs time only."""
+"""A file is used only if it is complete, has its name and belongs to this user; otherwise only time is lost."""
 
 import errno
 import os
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from protocol.kept_file import KERNEL, UNUSED_DAYS, cache_root, keep_file, load_file, prune
+from protocol import kept_file
+from protocol.kept_file import KERNEL, UNUSED_DAYS, cache_root, keep_file, load_file, made_by_one, prune
 
 
 @pytest.fixture
@@ -105,6 +107,49 @@ def test_an_old_file_in_a_folder_that_cannot_be_written_is_used(kept: Path, monk
     os.utime(kept, (long_ago, long_ago))
     monkeypatch.setattr(Path, "touch", denied)
     assert load_file(kept) == b"machine code"
+
+
+def test_two_that_make_a_file_take_turns(kept: Path) -> None:
+    file = kept.with_name(f"made{KERNEL}")
+    order: list[str] = []
+
+    def second() -> None:
+        with made_by_one(file):
+            order.append(f"second finds {load_file(file)!r}")
+
+    with made_by_one(file):
+        thread = threading.Thread(target=second)
+        thread.start()
+        thread.join(0.2)
+        order.append("first")
+        keep_file(file, b"code")
+    thread.join()
+    assert order == ["first", "second finds b'code'"]
+    assert set(kept.parent.iterdir()) == {kept, file}
+
+
+def test_who_waits_for_a_process_that_does_not_go_on_makes_the_file(
+    kept: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept_file, "PATIENCE_S", 0.1)
+    entered = []
+    with made_by_one(kept):
+        thread = threading.Thread(target=lambda: entered.extend(_enter(kept)))
+        thread.start()
+        thread.join()
+    assert entered == [True]
+
+
+def _enter(file: Path) -> list[bool]:
+    with made_by_one(file):
+        return [True]
+
+
+@pytest.mark.parametrize("folder", ["a file", os.devnull])
+def test_where_nothing_can_be_kept_nobody_waits(tmp_path: Path, folder: str) -> None:
+    (tmp_path / "a file").write_text("")
+    with made_by_one(tmp_path / folder / "name"):
+        pass
 
 
 def test_a_user_without_a_home_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

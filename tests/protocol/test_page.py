@@ -1,4 +1,4 @@
-"""A page: what stands in it, that it needs nothing else, and that nothing in it is obeyed."""
+"""A page: its content, that it is self-contained, and that no text in it is interpreted."""
 
 from html.parser import HTMLParser
 

@@ -1,4 +1,4 @@
-"""Stopping a table in virtual time: how far it goes on, how long it takes, and what it must not do."""
+"""Stopping a table in virtual time: its travel, its duration, and forbidden effects."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,7 @@ FASTEST, HARDEST = 40.0, 100.0
 
 @dataclass
 class Stopped:
-    """What the reference did from the moment of the stop on."""
+    """The motion of the reference after the stop."""
 
     speed_deg_s: float
     rate_deg_s2: float
@@ -29,7 +29,7 @@ class Stopped:
 
     @property
     def beyond_deg(self) -> float:
-        """How much farther than from the present speed at the greatest A."""
+        """How much farther than from the present speed at the maximum A."""
         return self.way_deg - self.speed_deg_s**2 / (2 * self.rate_deg_s2)
 
     @property
@@ -38,7 +38,7 @@ class Stopped:
 
 
 def stopped(client: TableClient, table: SimulatedBench, rate_deg_s2: float = HARDEST) -> Stopped:
-    """Stop a table, and return what its reference did."""
+    """Stop a table, and return the motion of its reference."""
     before = table.status()
     seen = [before]
     table.observer = lambda status, _heard, _said: seen.append(status)
@@ -69,7 +69,7 @@ def table_behind(client: TableClient) -> SimulatedBench:
 def table_at_rest(
     url: str = "emulator://", decimals: int = 1, rate: float = HARDEST, baud: int = 9600
 ) -> tuple[TableClient, SimulatedBench]:
-    """Return a table that rests, and has accepted its greatest S and A."""
+    """Return a table that rests, and has accepted its maximum S and A."""
     client = TableClient.open(url, baud or 9600, decimals=decimals)
     client.set_speed(FASTEST)
     client.set_acceleration(rate)
@@ -238,7 +238,7 @@ def test_a_dead_line_is_told_with_what_the_table_will_do() -> None:
     table.inject(fault_from("hang-up", {}))
     with pytest.raises(
         NotStopped,
-        match=r"the device has gone.*it runs on to its last target, 300 deg, and stands there within 13\.\d s$",
+        match=r"the device has disappeared.*it continues to its last target, 300 deg, and stops there within 13\.\d s$",
     ):
         client.stop()
 

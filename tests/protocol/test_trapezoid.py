@@ -1,4 +1,4 @@
-"""The profile against the firmware's own, tick by tick, and against Ruckig's time-optimal one."""
+"""The profile compared with the firmware's own, tick by tick, and with Ruckig's time-optimal one."""
 
 import itertools
 import math
@@ -61,7 +61,7 @@ def test_a_target_that_is_infinitely_far_is_like_one_beyond_every_braking_way(
 @settings(max_examples=100, deadline=None)
 def test_it_takes_the_shortest_time_that_there_is(state: ReferenceState, command: MotionCommand) -> None:
     if abs(state.speed_deg_s) > command.speed_deg_s:
-        return  # Ruckig first brakes as hard as it may; so do we, but it calls such a start invalid
+        return  # Ruckig first brakes at the limit; the controller does so too, but Ruckig calls such a start invalid
     asked = InputParameter(1)
     asked.current_position, asked.current_velocity = [state.angle_deg], [state.speed_deg_s]
     asked.target_position = [command.target_deg]

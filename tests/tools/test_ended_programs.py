@@ -1,4 +1,4 @@
-"""Programs that move a table, ended by a signal on a real pty; and programs that are interrupted as they start."""
+"""Programs that move a table, ended by a signal on a real pty; and programs interrupted during their start."""
 
 import re
 import signal
@@ -14,28 +14,16 @@ import pytest
 
 from emulator.control_client import request
 from tests.planner.run_examples import write_short_scan
+from tests.planner.small_scan import SMALL
 
 OURS = re.compile(rf"{re.escape(str(Path(__file__).parents[2]))}/(emulator|planner|protocol|tools)/")
 """A file of this project in a traceback."""
-SCAN = """
-[cell]
-workpiece_on_table = [0, 0, 80, 0, 0, 0]
-[workpiece]
-class = "cylinder"
-diameter_mm = 100
-height_mm = 100
-[path]
-pattern = "rings"
-bottom_margin_mm = 20
-scan_speed_mm_s = 25
-time_step_s = 0.5
-"""
 SLOWLY = 0.3
-"""The time scale of the emulator under a scan that would soon be over."""
-STANDS = re.compile(r"the table was stopped, and stands at (-?[0-9.]+) deg")
+"""The time scale of the emulator for a scan that would otherwise end too early."""
+STANDS = re.compile(r"the table was stopped and stands at (-?[0-9.]+) deg")
 
 
-class StandIn(NamedTuple):
+class EmulatorProcess(NamedTuple):
     """An emulator on a pty, and its control channel."""
 
     port: str
@@ -53,32 +41,32 @@ class StandIn(NamedTuple):
 
 
 @contextmanager
-def stand_in(folder: Path, time_scale: float = 1.0) -> Iterator[StandIn]:
+def start_emulator(folder: Path, time_scale: float = 1.0) -> Iterator[EmulatorProcess]:
     control = folder / "control"
     command = [sys.executable, "-m", "emulator", "--pty", "--control", str(control), "--time-scale", f"{time_scale}"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         assert process.stdout is not None
         try:
-            yield StandIn(process.stdout.readline().strip(), control)
+            yield EmulatorProcess(process.stdout.readline().strip(), control)
         finally:
             process.terminate()
 
 
-def run_command(table: StandIn, folder: Path) -> list[str]:
+def run_command(table: EmulatorProcess, folder: Path) -> list[str]:
     """Return `planner run` of a short plan, from a table that stands elsewhere."""
     words = ["planner", "run", str(write_short_scan(folder)), "--port", table.port, "--control", str(table.control)]
     return [*words, "--time-scale", f"{SLOWLY}", "--arm-away", "--out", str(folder / "out")]
 
 
-def scan_command(table: StandIn, folder: Path) -> list[str]:
+def scan_command(table: EmulatorProcess, folder: Path) -> list[str]:
     file = folder / "part.toml"
-    file.write_text(SCAN)
+    file.write_text(SMALL)
     words = ["planner", "scan", str(file), "--port", table.port, "--control", str(table.control), "--rate", "5"]
     quickly = ["--angles", "60", "--configuration", "LEFTY-ABOVE-NOFLIP", "--exact-calibration"]
     return [*words, *quickly, "--time-scale", f"{SLOWLY}", "--out", str(folder / "out")]
 
 
-def record_command(table: StandIn, folder: Path) -> list[str]:
+def record_command(table: EmulatorProcess, folder: Path) -> list[str]:
     return ["tools.identify", "record", "--port", table.port, "--out", str(folder / "trace.csv")]
 
 
@@ -98,7 +86,7 @@ def test_a_signal_stops_the_table_and_a_second_one_does_not_cut_that_short(
     name: str, numbers: Sequence[signal.Signals], tmp_path: Path
 ) -> None:
     command, time_scale = COMMANDS[name]
-    with stand_in(tmp_path, time_scale) as table:
+    with start_emulator(tmp_path, time_scale) as table:
         words = [sys.executable, "-m", *command(table, tmp_path)]
         with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             table.wait_until(is_moving=True)
@@ -117,7 +105,7 @@ def test_a_signal_stops_the_table_and_a_second_one_does_not_cut_that_short(
 
 @pytest.mark.realtime
 def test_an_ignored_ctrl_c_stays_ignored(tmp_path: Path) -> None:
-    with stand_in(tmp_path, 1.0) as table:
+    with start_emulator(tmp_path, 1.0) as table:
         script = f"trap '' INT; exec {sys.executable} -m {' '.join(record_command(table, tmp_path))} --duration 10"
         with subprocess.Popen(["/bin/sh", "-c", script], stderr=subprocess.PIPE, text=True) as process:
             table.wait_until(is_moving=True)

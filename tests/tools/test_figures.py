@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from planner.planning.dijkstra import dijkstra
-from planner.planning.lattice import speed_unit
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.plan import Plan
 from planner.planning.ray_shooting import cheapest_ray, no_cost_to_go, ray_accelerations, ray_shooting
-from planner.planning.verification import verify
-from tools.figures import (
+from planner.plans.plan import Plan
+from planner.plans.verification import verify
+from planner.search.lattice import speed_unit
+from planner.search.lattice_choice import turn_lattice
+from tools.figures import NAMES, main
+from tools.paper_figures import (
     FIGURES,
     MOMENTS,
     OBSTACLE_RAYS,
@@ -17,13 +18,16 @@ from tools.figures import (
     SHARED_SPEED_COUNT,
     SHARED_WORK,
     complete_rays,
-    main,
     obstacle_problem,
     shared_problem,
 )
 
 # Between the second obstacle's samples, in degrees, and halfway along it.
 SECOND_OBSTACLE_DEG, SECOND_OBSTACLE_LOCATION = (54.0, 144.0), 64
+
+
+def test_the_command_line_names_every_figure() -> None:
+    assert list(FIGURES) == list(NAMES)
 
 
 def shot() -> Plan:
@@ -34,7 +38,7 @@ def shot() -> Plan:
 
 
 def ways_at(moment: int) -> set[str]:
-    """Return on which sides of the second obstacle the rays from the plan's state at a moment get past both."""
+    """Return on which sides of the second obstacle the rays from the plan's state at a time pass both obstacles."""
     rays = complete_rays(obstacle_problem(), shot(), moment)
     at_obstacle = [ray[min(SECOND_OBSTACLE_LOCATION - moment, len(ray) - 1)] for ray in rays]
     return {"left" if angle < SECOND_OBSTACLE_DEG[0] else "between" for angle in at_obstacle}

@@ -35,7 +35,7 @@ def test_a_useless_recording_is_refused_in_one_line(tmp_path: Path, capsys: pyte
 
     message = capsys.readouterr().err
     assert status == 2
-    assert "1 readings in 0.0 s; needed are 300 in 10 s" in message
+    assert "1 readings in 0.0 s; required are 300 in 10 s" in message
     assert message.count("\n") == 1
     assert list(tmp_path.iterdir()) == [path]
 
@@ -72,5 +72,5 @@ def test_a_fit_writes_over_nothing_that_it_reads(out: str, tmp_path: Path, capsy
     )
 
     assert status == 2
-    assert f"{tmp_path / out} would be written over" in capsys.readouterr().err
+    assert f"{tmp_path / out} would be overwritten" in capsys.readouterr().err
     assert {path.name for path in tmp_path.iterdir()} == {"trace.csv", "known.toml"}

@@ -5,8 +5,15 @@ import pytest
 
 from emulator import Table, load_config
 from emulator.trace import TraceWriter, read_trace
+from tools import trace_figure
 from tools.command_marks import commands_of
-from tools.plot_trace import SIGNALS, draw_trace, main
+from tools.plot_trace import main
+from tools.trace_figure import draw_trace
+from tools.trace_signals import SIGNALS
+
+
+def test_the_command_line_names_every_signal_of_the_panels() -> None:
+    assert [name for panel in trace_figure._PANELS for name in panel.signals] == list(SIGNALS)  # noqa: SLF001  # the table
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +88,7 @@ def test_a_part_of_the_trace_and_of_its_signals_is_drawn(trace_path: Path) -> No
 
 
 def test_a_part_in_which_nothing_changes_is_a_line(trace_path: Path) -> None:
-    """The trace holds a stretch at rest as its first and last tick alone."""
+    """The trace contains only the first and the last tick of a rest."""
     figure = draw_trace(read_trace(trace_path), from_s=0.1, to_s=0.4, signals=("encoder_deg",))
 
     (curve,) = (line for line in figure.axes[0].lines if line.get_label() == "encoder")

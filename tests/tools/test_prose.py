@@ -1,4 +1,4 @@
-"""The prose linter finds a forbidden word in a page and in a help text, and leaves code alone."""
+"""The prose linter finds a forbidden word in a page, a help text and Python source, and ignores code."""
 
 import argparse
 from pathlib import Path
@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from tools.prose.__main__ import help_texts, main
-from tools.prose.rules import findings, load_rules
+from tools.prose.python_texts import texts
+from tools.prose.rules import findings, load_rules, long_sentences, python_findings
 
 RULES = load_rules()
 
@@ -18,7 +19,7 @@ RULES = load_rules()
         ("The table says where it is.", "says"),
         ("This is no number.", "is no"),
         ("It prints the\ngreatest speed.", "the greatest"),
-        ("Hold it against tables of another make.", "tables of another make"),
+        ("Test tables of another make.", "tables of another make"),
         ("The value is foretold.", "foretold"),
     ],
 )
@@ -67,5 +68,89 @@ def test_a_forbidden_word_in_a_help_text_is_found() -> None:
     assert finding.instead == "decimal places"
 
 
-def test_docs_and_help_texts_are_clean(capsys: pytest.CaptureFixture[str]) -> None:
+SOURCE = '''"""The table says where it is."""
+
+LIMIT = 3  # noqa: ANN401  # struck anew
+"""The time-out."""
+
+
+def run(number: int) -> None:
+    """Run it.
+
+    Args:
+        say: the number.
+        number: the number,
+            once and for all.
+    """
+    # The table
+    # hears it, `says` so.
+    print("# no comment: it was told", "says")
+    raise ValueError(f"the port {number} was not told what to do")
+'''
+
+
+def test_forbidden_words_are_found_in_docstrings_comments_and_messages_of_python_source() -> None:
+    found = {(finding.line, finding.words) for finding in python_findings(SOURCE, RULES)}
+    assert found == {
+        (1, "says"),
+        (3, "struck"),
+        (3, "anew"),
+        (4, "time-out"),
+        (16, "hears"),
+        (17, "told"),
+        (18, "told"),
+    }
+
+
+def test_the_strings_of_a_test_are_data() -> None:
+    lines = {finding.line for finding in python_findings(SOURCE, RULES, messages=False)}
+    assert lines == {1, 3, 4, 16}
+
+
+def test_texts_of_source_have_their_lines_and_no_directives() -> None:
+    assert sorted(texts("# one\n# two\nx = 1  # noqa: E501\ny = 2  # three\n")) == [
+        (1, "one\ntwo"),
+        (3, ""),
+        (4, "three"),
+    ]
+
+
+def words(count: int) -> str:
+    return " ".join(["word"] * count)
+
+
+@pytest.mark.parametrize(
+    ("text", "starts"),
+    [
+        (words(26), [1]),
+        (words(25), []),
+        (f"{words(25)}. {words(25)}", []),
+        (f"{words(25)}:\n{words(26)}", [2]),
+        (f"{words(20)}\n\n{words(20)}", []),
+        (f"{words(20)}\n- {words(20)}", []),
+        (f"`{words(30)}`", []),
+        (f"Text.\n\n{words(10)}\n{words(16)}\n", [3]),
+        (f"Examples:\n\n    {words(40)}\n", []),
+    ],
+)
+def test_a_sentence_of_more_than_25_words_is_found_at_its_start(text: str, starts: list[int]) -> None:
+    assert [finding.line for finding in long_sentences(text)] == starts
+
+
+def test_entries_of_a_docstring_are_sentences_of_their_own() -> None:
+    entries = "\n".join(f"        name_{index}: {words(10)}" for index in range(4))
+    source = f'def run():\n    """Run it.\n\n    Args:\n{entries}\n    """\n'
+    assert not list(python_findings(source, RULES))
+
+
+def test_a_forbidden_word_in_a_source_file_ends_the_linter_with_status_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    module = tmp_path / "module.py"
+    module.write_text(SOURCE, encoding="utf-8")
+    assert main([str(module)]) == 1
+    assert f"{module}:16: 'hears': write " in capsys.readouterr().out
+
+
+def test_all_prose_of_the_project_is_clean(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 0, capsys.readouterr().out

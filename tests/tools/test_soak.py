@@ -1,4 +1,4 @@
-"""Each soak in small; the full ones are run by `python -m tools.soak`."""
+"""Each soak at a small size; `python -m tools.soak` runs the full ones."""
 
 import pytest
 

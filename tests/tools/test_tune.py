@@ -34,7 +34,7 @@ def test_the_command_line_writes_gains_header_report_and_plots(
     load_config(tmp_path / "out" / "gains.toml")
     report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert report.count("<svg") == 4
-    assert "src=" not in report  # nothing is fetched from elsewhere
+    assert "src=" not in report  # nothing is loaded from elsewhere
 
 
 def judged(gains: str, folder: Path, *options: str) -> tuple[int, dict[str, Any]]:
@@ -55,7 +55,7 @@ def test_gains_that_keep_all_bounds_are_judged_with_status_0(
     assert figures["sets"]["hold"]["after"]["proportional_duty_s_deg"] == pytest.approx(0.016, rel=1e-4)
     assert all(bound["holds"] for each in figures["sets"].values() for bound in each["bounds"].values())
     assert figures["checks"]["load_step"]["load_peak_deg_s"]["after"]["emulator"] > 0.1
-    assert "Both sets keep all bounds" in capsys.readouterr().out
+    assert "Both sets satisfy all bounds" in capsys.readouterr().out
     assert load_config(tmp_path / "out" / "gains.toml").gains.hold.proportional_duty_s_deg == pytest.approx(0.016)
 
 
@@ -73,9 +73,9 @@ def test_gains_that_break_bounds_are_reported_in_full_with_status_1(
     assert figures["sets"]["hold"]["bounds"]["sensitivity_peak"]["holds"] is True
     assert figures["checks"]["ramp"]["ramp_lag_deg_s"]["after"]["model"] is None
     report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "Not all bounds hold: the ramp set is not stable; the constant-speed set breaks " in report
+    assert "Not all bounds are satisfied: the ramp set is not stable; the constant-speed set breaks " in report
     assert report.count("<svg") == 4
-    assert "Not all bounds hold" in capsys.readouterr().out
+    assert "Not all bounds are satisfied" in capsys.readouterr().out
 
 
 def test_the_judged_file_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -126,7 +126,7 @@ def test_where_no_gains_keep_all_bounds_a_report_is_written_and_the_printed_comm
     assert {path.name for path in out.iterdir()} >= {"report.html", "answers.svg"}
     assert not (out / "gains.toml").exists()
     report = (out / "report.html").read_text(encoding="utf-8")
-    assert "No gains keep all bounds: the ramp set breaks " in report
+    assert "No gains satisfy all bounds: the ramp set breaks " in report
     assert "the constant-speed set breaks " in message
     words = shlex.split(message.partition("this works: ")[2])
     assert words[:3] == ["python", "-m", "tools.tune"]

@@ -1,3 +1,3 @@
-"""Benchmarks: what a file measures beside its peers is its name."""
+"""Benchmarks; each file is named after what it measures."""
 
-import protocol.quiet_start  # noqa: F401 - before the imports that take long
+import protocol.quiet_start  # noqa: F401 - before the slow imports

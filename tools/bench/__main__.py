@@ -1,4 +1,4 @@
-"""Benchmarks: every figure beside a peer that runs in the same minute on the same machine.
+"""Benchmarks: every figure is compared with a reference that runs in the same minute on the same machine.
 
 python -m tools.bench emulator map
 python -m tools.bench identify --pty
@@ -12,13 +12,16 @@ from importlib import import_module
 from protocol.command_line import Parser, program_name
 from protocol.ending import ended
 
-SUBJECTS = ("adaptive", "calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream")
+SUBJECTS = (
+    "adaptive", "avr", "calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream", "track",
+)  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the named benchmarks and print their tables."""
     options = _parser().parse_args(arguments)
-    # Each needs libraries that the others do not. An interrupt must not break into the import of compiled ones.
+    # Each benchmark needs libraries that the others do not. An interrupt must not occur during the import of compiled
+    # ones.
     benches = {subject: import_module(f"tools.bench.{subject}").bench for subject in options.subject}
     return ended("bench", lambda: _run(options, benches))
 
@@ -29,6 +32,10 @@ def _run(options: argparse.Namespace, benches: Mapping[str, Callable[..., None]]
             bench(sys.stdout, options.plants, options.seed, options.jobs, options.pty, options.wide)
         elif subject == "adaptive":
             bench(sys.stdout, tuple(options.scan))
+        elif subject == "track":
+            bench(sys.stdout, options.pty)
+        elif subject == "avr":
+            bench(sys.stdout, options.ticks, options.lines, options.seed)
         else:
             bench(sys.stdout)
     return 0
@@ -47,15 +54,22 @@ def _parser() -> Parser:
         "--scan", metavar="SCAN", action="append", default=[], help="a scan file (default: all shipped scans)"
     )
     identify = parser.add_argument_group("for identify")
-    identify.add_argument("--pty", action="store_true", help="in real time: takes minutes, on a quiet machine")
+    parser.add_argument(
+        "--pty", action="store_true", help="for identify and track: in real time, minutes on a quiet machine"
+    )
     identify.add_argument(
         "--wide", action="store_true", help="a wider family of tables, and the default table with seeds 0 to 19"
     )
     identify.add_argument(
         "--plants", metavar="N", type=int, help="number of random tables (default: 10; with --wide 40)"
     )
-    identify.add_argument("--seed", metavar="N", type=int, default=1, help="of the first table (default 1)")
+    identify.add_argument(
+        "--seed", metavar="N", type=int, default=1, help="of the first table, or of the client of avr (default 1)"
+    )
     identify.add_argument("--jobs", metavar="N", type=int, default=2, help="tables at once (default 2)")
+    avr = parser.add_argument_group("for avr")
+    avr.add_argument("--ticks", metavar="N", type=int, default=10_000_000, help="in lockstep (default: %(default)s)")
+    avr.add_argument("--lines", metavar="N", type=int, default=100_000, help="of fuzzing (default: %(default)s)")
     return parser
 
 

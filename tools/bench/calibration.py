@@ -1,4 +1,4 @@
-"""How often the calibrations refuse good and bad measurements, and whether their stated uncertainty is right."""
+"""How often the calibrations refuse valid and faulty measurements, and whether their stated uncertainty is correct."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TextIO
@@ -31,17 +31,17 @@ class Outcome(NamedTuple):
 
 
 class ProbeTrial(NamedTuple):
-    """Views of a sphere, and what is wrong with them.
+    """Views of a sphere, with their faults.
 
     Attributes:
-        radius_mm: The radius that the calibration is given.
-        true_radius_mm: The radius that the sphere has.
-        noise_mm: Noise of a point along its ray.
-        views: Directions from which the sphere is seen.
-        profiles: Profiles from each.
-        moved_mm: By how much the sphere moves, in a random direction.
-        moved_after: After which share of the views; None where it drifts all the time.
-        is_outlier: Whether it moves back after one view.
+        radius_mm: the radius that is given to the calibration.
+        true_radius_mm: the true radius of the sphere.
+        noise_mm: noise of a point along its ray.
+        views: number of directions of the views.
+        profiles: number of profiles from each direction.
+        moved_mm: displacement of the sphere, in a random direction.
+        moved_after: share of the views before the displacement; None for a continuous drift.
+        is_outlier: whether it moves back after one view.
     """
 
     radius_mm: float = 15.0
@@ -54,7 +54,7 @@ class ProbeTrial(NamedTuple):
     is_outlier: bool = False
 
     def run(self, seed: int) -> Outcome:
-        """Return what the calibration makes of it."""
+        """Return the result of the calibration."""
         rng = np.random.default_rng((seed, 14))
         probe = LaserProbe(noise_mm=self.noise_mm)
         T_FS = _TRUE.T_FS @ placement(*rng.uniform(-20.0, 20.0, 6))
@@ -81,7 +81,7 @@ class ProbeTrial(NamedTuple):
         )
 
     def _shares(self, count: int) -> FloatArray:
-        """Return by which share of its way the sphere has moved in each view."""
+        """Return the share of its displacement by which the sphere has moved in each view."""
         if self.moved_after is None:
             return np.linspace(0.0, 1.0, count)
         first = int(self.moved_after * count)
@@ -95,9 +95,9 @@ class AxisTrial(NamedTuple):
     """Centers of a sphere that turns with the table.
 
     Attributes:
-        angles_deg: The table's angles.
-        noise_mm: Noise of each coordinate of a center.
-        moved_mm: By how much the sphere moves on the table half-way, in a random direction.
+        angles_deg: table angles.
+        noise_mm: noise of each coordinate of a center.
+        moved_mm: displacement of the sphere on the table halfway, in a random direction.
     """
 
     angles_deg: tuple[float, ...]
@@ -105,7 +105,7 @@ class AxisTrial(NamedTuple):
     moved_mm: float = 0.0
 
     def run(self, seed: int) -> Outcome:
-        """Return what the calibration makes of it."""
+        """Return the result of the calibration."""
         rng = np.random.default_rng((seed, 15))
         angles = np.array(self.angles_deg)
         T_BT = _TRUE.T_BT @ placement(*rng.uniform(-20.0, 20.0, 2), 0.0, 30.0, rng.uniform(0.0, 3.0), -30.0)

@@ -1,6 +1,6 @@
-"""Measure the default planner on every family: what it finds and proves, its cost, and its CPU time before and after.
+"""Measure the default planner on every family: plans and proofs, cost, and CPU time before and after.
 
-"Before" is the plan of the interpolated cost-to-go alone.
+"Before" is the plan from the interpolated cost-to-go alone.
 """
 
 import math
@@ -12,29 +12,29 @@ import numpy as np
 
 from planner.planning.dynamic_programming import dynamic_programming
 from planner.planning.interpolated_planner import interpolated_plan
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.lattice_search import best_motion
-from planner.planning.plan import Infeasibility, NoPlan, Plan, make_plan
-from planner.planning.problem import Problem
-from planner.planning.unreachability_proof import first_unreachable_location
-from planner.planning.verification import verify
+from planner.plans.plan import Infeasibility, NoPlan, Plan, make_plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
+from planner.search.lattice_choice import turn_lattice
+from planner.search.lattice_search import best_motion
+from planner.search.unreachability_proof import first_unreachable_location
 from tools.bench.planner_families import FAMILIES, Family, around_a_motion
 
-# The lattice that plans are measured against: speeds each way, and any number of steps a column.
+# The reference lattice: speeds in each direction, and any number of steps per column.
 SPEED_COUNT, WORK = 20, 1_000_000_000
 
 SUB_STEPS = 32
 
 WIDTHS = (21, 5, 9, 13, 7, 10, 15, 15, 6, 5)
 
-# Maps around known motions, and cells of speed of the proofs that are tried on each.
+# Maps around known motions, and cells of speed for the proofs that are tried on each.
 ATTACKS, CELL_COUNTS = 1000, (4, 32, 128)
 
 Result = TypeVar("Result")
 
 
 class Case(NamedTuple):
-    """What came out for one problem; a cost is infinite without a plan."""
+    """The result for one problem; a cost is infinite without a plan."""
 
     cost: float
     before: float
@@ -46,7 +46,7 @@ class Case(NamedTuple):
 
     @property
     def is_missed(self) -> bool:
-        """Whether somebody else found a way."""
+        """Whether another planner found a plan."""
         return math.isinf(self.cost) and min(self.before, self.optimum) < math.inf
 
 
@@ -64,7 +64,7 @@ def bench_default_planner(stream: TextIO) -> None:
 
 
 def _attack_proof(stream: TextIO) -> None:
-    """Try to prove that maps cannot be crossed which a known motion crosses."""
+    """Try to prove that maps cannot be crossed although a known motion crosses them."""
     proved = found = 0
     for seed in range(ATTACKS):
         problem = around_a_motion(seed).problem
@@ -74,7 +74,7 @@ def _attack_proof(stream: TextIO) -> None:
 
 
 def lattice_optimum(problem: Problem) -> Plan | None:
-    """Return the best path of a lattice with at least 20 speeds each way; None where it has none."""
+    """Return the best path of a lattice with at least 20 speeds in each direction; None if it has none."""
     lattice = turn_lattice(problem, SPEED_COUNT, WORK)
     motion = None if lattice is None else best_motion(problem, lattice)
     return None if motion is None else make_plan(problem, "lattice", *motion)
@@ -98,7 +98,10 @@ def measure(problem: Problem) -> Case:
 
 
 def can_be_executed(problem: Problem, plan: Plan) -> bool:
-    """Return whether a plan keeps the limits and no sub-step is forbidden: by look-ups, without the crossing rule."""
+    """Return whether a plan obeys the limits and no sub-step is forbidden.
+
+    This is checked by look-ups, without the crossing rule.
+    """
     if not verify(problem, plan).within_limits:
         return False
     for k, acceleration in enumerate(plan.accelerations_deg_s2):

@@ -1,4 +1,4 @@
-"""What the emulator costs, beside peers that run in the same minute on the same machine."""
+"""The speed of the emulator, compared with references that run in the same minute on the same machine."""
 
 import os
 import resource
@@ -41,7 +41,7 @@ def bench(stream: TextIO) -> None:
 
 
 def _bench_simulation(stream: TextIO) -> None:
-    """Print the speeds of what is in motion already; what a start costs is in `_bench_growth`."""
+    """Print the speeds of a running emulator; `_bench_growth` measures the start."""
     config = load_config()
     runs = {
         "emulator, compiled (full physics)": (1000.0, _compiled_motion),
@@ -77,7 +77,7 @@ def _bench_growth(stream: TextIO) -> None:
 
 
 def _bench_virtual_time(stream: TextIO) -> None:
-    """Print what clients of `emulator://` wait for, interpreted as without numba, and compiled."""
+    """Print the waiting times of clients of `emulator://`, interpreted as without numba, and compiled."""
     plans = list(random_run_inputs(3, margin=3))
     rows = []
     for name, warm_up_ticks in (("interpreted", 10**15), ("compiled", 0)):
@@ -105,7 +105,7 @@ def _minute_of_motion() -> Callable[[], object]:
 def _bench_round_trip(stream: TextIO) -> None:
     with _raw_echo() as (path, _):
         echo = _round_trips(path)
-    with _stand_in("--pty", "--baud", "0") as (path, _):
+    with _emulator("--pty", "--baud", "0") as (path, _):
         ours = _round_trips(path)
     rows = [
         (name, f"{percentile(times, 0.5) * 1e3:.3f} ms", f"{percentile(times, 0.99) * 1e3:.3f} ms")
@@ -133,7 +133,7 @@ def _bench_start(stream: TextIO) -> None:
 
 
 def _bench_idle(stream: TextIO) -> None:
-    with _stand_in("--pty") as (_, process):
+    with _emulator("--pty") as (_, process):
         time.sleep(0.5)
         before, start = _cpu_s(process.pid), time.perf_counter()
         time.sleep(4.0)
@@ -159,7 +159,7 @@ def _compiled_motion(config: TableConfig, simulated_s: float) -> Callable[[], ob
 
 
 def _interpreted_motion(config: TableConfig, simulated_s: float) -> Callable[[], object]:
-    """Return a run that goes on where the one before it ended."""
+    """Return a run that continues the previous one."""
     table = Table(config.with_serial(baud=0))
     table.receive(b"R 100000\r")
     ticks = round(simulated_s * config.control.tick_hz)
@@ -167,7 +167,7 @@ def _interpreted_motion(config: TableConfig, simulated_s: float) -> Callable[[],
 
 
 def _linear_loop(config: TableConfig, simulated_s: float) -> Callable[[], object]:
-    """Return the peer: motor and PI in python-control, without friction, gears, quantization or protocol."""
+    """Return the reference: motor and PI in python-control, without friction, gears, quantization or protocol."""
     motor, tick_s = config.motor, 1.0 / config.control.tick_hz
     inertia = motor.rotor_inertia_kg_m2 + config.gears.inertia_kg_m2
     plant = control.ss(
@@ -229,7 +229,7 @@ def _raw_echo() -> Iterator[tuple[str, None]]:
 
 
 @contextmanager
-def _stand_in(*arguments: str) -> Iterator[tuple[str, "subprocess.Popen[str]"]]:
+def _emulator(*arguments: str) -> Iterator[tuple[str, "subprocess.Popen[str]"]]:
     command = own_program("emulator", *arguments)
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=own_environment()

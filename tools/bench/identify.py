@@ -1,4 +1,4 @@
-"""The accuracy of the constants that a minute over the wire gives, for tables that the fit does not know.
+"""The accuracy of the constants from a recording of one minute, for tables that are unknown to the fit.
 
 python -m tools.bench identify          ten random tables over emulator://
 python -m tools.bench identify --wide   40 of a family twice as wide, and the default table with seeds 0 to 19
@@ -36,15 +36,15 @@ _ERROR_WIDTH = len("-100.0 * ?")
 
 
 class Found(NamedTuple):
-    """One estimate against the truth."""
+    """One estimate with the true value."""
 
     error: float
-    inside: bool  # the truth is in the 95 % interval
+    inside: bool  # the true value is in the 95 % interval
     identifiable: bool
 
 
 class Outcome(NamedTuple):
-    """A fit: its estimates, the CPU time it took, and why it was refused, if it was."""
+    """A fit: its estimates, its CPU time, and why it was refused, if it was."""
 
     constants: dict[str, Found]
     cpu_s: float
@@ -82,7 +82,7 @@ def _bench(stream: TextIO, family: Family, seeds: Sequence[int], jobs: int, pty:
 
 
 def _outcomes(family: Family, seeds: Sequence[int], jobs: int, pty: bool) -> Iterator[tuple[int, float, Outcome]]:
-    """Yield seed, backlash (arcmin) and outcome of each table as soon as it is fitted."""
+    """Yield seed, backlash (arcmin) and result of each table as soon as it is fitted."""
     with tempfile.TemporaryDirectory() as name, ProcessPoolExecutor(jobs) as workers:
         folder = Path(name)
         tables = [family.table(seed) for seed in seeds]
@@ -95,7 +95,7 @@ def _outcomes(family: Family, seeds: Sequence[int], jobs: int, pty: bool) -> Ite
             for seed, table in zip(seeds, tables, strict=True)
         ]
         recordings = list(workers.map(partial(_recorded, pty=pty), truth, seeds))
-        # Fitted only now: it keeps the cores busy, which would disturb a recording.
+        # Fitted after the recordings: it uses all cores, which would disturb a recording.
         outcomes = workers.map(_identified, known, truth, recordings)
         for seed, path, outcome in zip(seeds, truth, outcomes, strict=True):
             yield seed, load_config(path).gears.backlash_arcmin, outcome
@@ -106,7 +106,7 @@ def _cell(found: Found) -> str:
 
 
 def _print_summary(stream: TextIO, family: Family, outcomes: Sequence[Outcome]) -> None:
-    """Print how often the intervals hold, and how large the errors are, per constant."""
+    """Print the share of correct intervals, and the size of the errors, per constant."""
     accepted = [outcome.constants for outcome in outcomes if not outcome.refused]
     rows = []
     for name in next(iter(accepted), {}):
@@ -162,7 +162,7 @@ def _record_over(port: str) -> WireRecording:
 
 
 def _identified(known: Path, truth: Path, recording: WireRecording) -> Outcome:
-    """Return what a fit that knows only a part of the constants makes of a recording."""
+    """Return the result of a fit in which only some of the constants are known."""
     assumed, true = load_config(known), load_config(truth)
     begin_s = time.process_time()
     refused, constants = "", {}

@@ -19,7 +19,7 @@ SPREAD = {
     "friction.stribeck_speed_rad_s": 0.3,
     "friction.viscous_Nm_s": 0.4,
 }
-"""Bounds of the logarithms, about the default table's constants."""
+"""Bounds of the logarithms, relative to the default table's constants."""
 
 BACKLASH_ARCMIN = (2.5, 40.0)
 
@@ -30,22 +30,22 @@ _WIDE_INERTIA = (0.3, 5.0)
 _RATIOS = (120.0, 240.0, 300.0, 480.0, 600.0)
 _LINES = (50, 64, 96, 100, 128, 256, 500)
 _COUNTS_A_TICK = (5.0, 30.0)
-"""Of a usable encoder, at 40 deg/s."""
+"""Noise limit of a usable encoder, at 40 deg/s."""
 _GREATEST_EFFICIENCY = 0.95
 
 Constants = dict[str, float]
-"""By their keys in a table's configuration."""
+"""The keys in a table's configuration."""
 
 
 class Table(NamedTuple):
-    """A table: what is known of it beforehand, and what the fit must find."""
+    """A table: its known constants, and those that the fit must find."""
 
     known: Constants
     hidden: Constants
 
 
 class Family(NamedTuple):
-    """Tables by their seeds, and the errors that are allowed."""
+    """Tables by their seeds, and the allowed errors."""
 
     title: str
     table: Callable[[int], Table]
@@ -58,7 +58,7 @@ def narrow(seed: int) -> Table:
 
 
 def wide(seed: int) -> Table:
-    """Return a table of ranges twice as wide, with another gear ratio and encoder."""
+    """Return a table from ranges twice as wide, with another gear ratio and encoder."""
     chance, usual = Random(seed), load_config()  # noqa: S311  # spreads the tables
     hidden = {
         name: _usual(name) * exp(chance.uniform(-_WIDE_SHARE * spread, _WIDE_SHARE * spread))
@@ -80,7 +80,7 @@ def wide(seed: int) -> Table:
 
 
 def default(_seed: int) -> Table:
-    """Return the default table; the seed places its shaft and teeth."""
+    """Return the default table; the seed determines the positions of its shaft and teeth."""
     return Table({}, {})
 
 

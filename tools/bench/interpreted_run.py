@@ -1,4 +1,4 @@
-"""A run of the table alone in its process, without numpy and numba, as the emulator runs it.
+"""A run of the table alone in its process, without numpy and numba, as in the emulator.
 
 python -m tools.bench.interpreted_run 90 24 86400     24 motions by 90 degrees in a day; prints wall seconds and peak MB
 """
@@ -22,7 +22,7 @@ def interpreted_run(angle_deg: float, motions: int, simulated_s: float) -> tuple
 
 
 def _peak_memory_mb() -> float:
-    """Return this program's peak memory (Linux); what `resource` says begins with that of the parent."""
+    """Return this program's peak memory (Linux); the value from `resource` includes the parent's."""
     status = Path("/proc/self/status").read_text(encoding="ascii")
     return int(status.partition("VmHWM:")[2].split()[0]) / 1024
 

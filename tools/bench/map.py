@@ -1,4 +1,4 @@
-"""What a configuration map costs, beside py-opw-kinematics and coal in the same run, and how it grows."""
+"""The computing time of a configuration map and its growth, compared with py-opw-kinematics and coal."""
 
 import resource
 import subprocess
@@ -88,7 +88,7 @@ def _least_distance(ends: FloatArray) -> float:
 
 
 def _coal_distances(ends: FloatArray) -> Callable[[], object]:
-    """Return what asks coal for each distance, all its objects made beforehand."""
+    """Return a function that computes each distance with coal; its objects are created in advance."""
     lengths = np.linalg.norm(ends[:, 1::2] - ends[:, ::2], axis=2)
     middles = (ends[:, 1::2] + ends[:, ::2]) / 2
     directions = (ends[:, 1::2] - ends[:, ::2]) / lengths[:, :, None]
@@ -151,7 +151,7 @@ def _bench_growth(stream: TextIO) -> None:
 
 
 def _measure_growth(locations: int, angles: int) -> None:
-    """Print the time of one map and how far it raises this process's peak memory."""
+    """Print the time of one map and the increase of this process's peak memory."""
     problem = _with_locations(map_problem(load_scan("mould")), locations)
     build_maps(_with_locations(problem, 2), ALL, 8)  # loads the machine code
     before = _peak_mb()
@@ -165,7 +165,7 @@ def _peak_mb() -> float:
 
 
 def _with_locations(problem: MapProblem, count: int) -> MapProblem:
-    """Return the problem with so many of its locations, evenly chosen, some of them repeated if need be."""
+    """Return the problem with the given number of locations, evenly selected, some repeated if necessary."""
     chosen = np.linspace(0, len(problem.T_WS) - 1, count).round().astype(int)
     return replace(problem, T_WS=problem.T_WS[chosen])
 

@@ -1,4 +1,4 @@
-"""Measure the planners: against the optimum of exact lattices, beside scipy's Dijkstra, and how they grow."""
+"""Measure the planners: compared with the optimum of exact lattices and with scipy's Dijkstra, and their growth."""
 
 import ctypes
 import gc
@@ -17,25 +17,25 @@ from planner.kinematics.configuration import Configuration
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
 from planner.map.synthetic_maps import MapFamily, synthetic_map
-from planner.planning.cost_to_go import cost_to_go, lay_out_columns
 from planner.planning.dijkstra import shortest_path
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.lattice_cost_to_go import cost_to_go as lattice_cost_to_go
-from planner.planning.plan import Outcome, Plan, Planner
 from planner.planning.planners import PLANNERS
-from planner.planning.problem import Problem
 from planner.planning.ray_shooting import Rays, ray_shooting
 from planner.planning.receding import FAST_SPEED_COUNT, SPEED_COUNT, online_step, prepare_online_step, receding
 from planner.planning.scan_problem import scan_problem
 from planner.planning.smoothing import smooth
-from planner.planning.state_grid import Grid
-from planner.planning.verification import verify
+from planner.plans.plan import Outcome, Plan, Planner
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
+from planner.search.cost_to_go import cost_to_go, lay_out_columns
+from planner.search.lattice_choice import turn_lattice
+from planner.search.lattice_cost_to_go import cost_to_go as lattice_cost_to_go
+from planner.search.state_grid import Grid
 from planner.table.motion import Limits
 from tools.bench.default_planner import bench_default_planner, lattice_optimum
 from tools.bench.planner_families import FAMILIES
 
-# All planners are compared on the first families, on which ray shooting gets along.
+# All planners are compared on the first families, on which ray shooting finds plans.
 COMPARED_FAMILIES = 11
 
 
@@ -53,7 +53,7 @@ COMPARED: Mapping[str, Planner] = {
 
 
 class Tally(NamedTuple):
-    """What one planner did on one family."""
+    """The results of one planner on one family."""
 
     ratios: list[float]
     touched: list[bool]
@@ -72,7 +72,7 @@ def bench(stream: TextIO) -> None:
 
 
 def median_seconds(function: Callable[[], object], repeats: int = 15) -> float:
-    """Return the median time of a call, after one that compiles."""
+    """Return the median time of a call, after a first call that compiles."""
     function()
     times = []
     for _ in range(repeats):
@@ -83,7 +83,7 @@ def median_seconds(function: Callable[[], object], repeats: int = 15) -> float:
 
 
 def peak_memory_mb(function: Callable[[], object]) -> float:
-    """Return by how much a call raises this process's resident memory at its peak (Linux)."""
+    """Return the increase of this process's peak resident memory by a call (Linux)."""
     gc.collect()
     ctypes.CDLL(None).malloc_trim(0)
     Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
@@ -100,7 +100,8 @@ def _status_mb(key: str) -> float:
 
 
 def _bench_graph(stream: TextIO) -> None:
-    # At 4.5 s a step, multiples of 0.8 deg/s end each step on a node: 50 speeds each way, 10 changes of speed.
+    # At 4.5 s per step, multiples of 0.8 deg/s end each step on a node: 50 speeds in each direction, 10 changes of
+    # speed.
     problem = Problem(synthetic_map(MapFamily(0.2, 5.0), seed=1), 4.5, Limits(40.0, 8.0 / 4.5))
     lattice = turn_lattice(problem, 50, 1_000_000)
     assert lattice is not None
@@ -167,7 +168,7 @@ def _row(tally: Tally) -> str:
 
 
 def _tally(problem: Problem, tallies: dict[str, Tally]) -> bool:
-    """Plan one map by all planners from the optimum's start; tell whether the lattice has a way."""
+    """Plan one map by all planners from the optimum's start; return whether the lattice has a path."""
     optimum = lattice_optimum(problem)
     if optimum is None:
         return False

@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.map.config_map import ConfigurationMap, sample_at_or_above, sample_at_or_below
 from planner.map.synthetic_maps import MapFamily, smooth_noise, synthetic_map
-from planner.planning.problem import Problem
+from planner.plans.problem import Problem
 from planner.table.cost import Weights, default_weights
 from planner.table.motion import Limits, Motion, roll_out, swept_angles
 
@@ -16,9 +16,9 @@ class Family(NamedTuple):
     """A family of problems.
 
     Attributes:
-        name: what is printed.
-        problem: makes the problem of a seed.
-        map_count: how many to take.
+        name: the printed name.
+        problem: creates the problem of a seed.
+        map_count: number of maps.
     """
 
     name: str
@@ -27,7 +27,7 @@ class Family(NamedTuple):
 
 
 def weights(factor: float) -> Weights:
-    """Return so many times the default weights."""
+    """Return the default weights times a factor."""
     return Weights(*(weight * factor for weight in default_weights(Limits())))
 
 
@@ -49,7 +49,7 @@ def of_noise(forbidden: float) -> Callable[[int], Problem]:
 
 
 def near_the_limit(seed: int) -> Problem:
-    """Return a problem that starts off the samples at nearly the greatest speed."""
+    """Return a problem that starts between the samples at nearly the maximum speed."""
     family = MapFamily(0.2, 4.0)
     brightest = int(np.argmax(synthetic_map(family, seed).values[0]))
     start_deg = 3.6 * brightest + 1.234
@@ -59,7 +59,10 @@ def near_the_limit(seed: int) -> Problem:
 def corridor(
     angle_count: int, limit_deg_s: float, drift_deg_s: float, width: int, start_speed_deg_s: float | None
 ) -> Problem:
-    """Return a map that is forbidden but for a band of so many samples, which drifts at a speed near the limit."""
+    """Return a map that is forbidden except for a band of the given number of samples.
+
+    The band drifts at a speed near the limit.
+    """
     generator = np.random.default_rng(width)
     values = np.zeros((60, angle_count))
     for k in range(60):
@@ -80,7 +83,7 @@ def fast_fine_corridor(seed: int) -> Problem:
 
 
 def of_gaps(width: int) -> Callable[[int], Problem]:
-    """Return problems with a wall every 8 to 13 columns that has a gap of so many samples in one column."""
+    """Return problems with a wall every 8 to 13 columns, each with a gap of some samples in one column."""
 
     def problem(seed: int) -> Problem:
         generator = np.random.default_rng(seed)
@@ -97,16 +100,16 @@ def of_gaps(width: int) -> Callable[[int], Problem]:
 
 
 class KnownMotion(NamedTuple):
-    """A map that is forbidden but for what a motion sweeps, and that motion."""
+    """A map that is forbidden except for the angles of a motion, and that motion."""
 
     problem: Problem
     motion: Motion
 
 
 def around_a_motion(seed: int) -> KnownMotion:
-    """Return a map that a known motion crosses, with hardly any room for another.
+    """Return a map that a known motion crosses, with hardly any space for another one.
 
-    Step, limits, samples, wildness of the motion and width of the corridor are drawn from the seed.
+    The seed determines step, limits, samples, smoothness of the motion and width of the corridor.
     """
     generator = np.random.default_rng(seed)
     columns, angle_count = int(generator.integers(10, 80)), int(generator.choice([36, 60, 90, 100, 180]))

@@ -1,4 +1,7 @@
-"""What laser profiles cost beside trimesh's own ray casting, and what a whole scan takes in time and memory."""
+"""The computing time of laser profiles, compared with trimesh's ray casting.
+
+Also the time and the memory of a whole scan.
+"""
 
 import resource
 import subprocess

@@ -1,7 +1,7 @@
-"""How a stop ends, from moments all over the shipped plans: how far the table goes on, for how long, and how far back.
+"""The result of a stop at many times of the shipped plans: travel, duration, and distance back.
 
-A plan runs once in virtual time. At every so many uses of its port (a line that is about to be written, a reply that is
-waited for) table and client are copied, and the copies are stopped, as Ctrl-C at this moment would do it.
+A plan runs once in virtual time. At regular uses of its port (before a line is written, or while a reply is waited for)
+table and client are copied. The copies are stopped, as Ctrl-C at this time would do.
 """
 
 import copy
@@ -22,15 +22,15 @@ from tools.bench.timing import print_table
 from tools.bench.virtual_run import shipped_run_input
 
 EVERY = 20
-"""Uses of the port from one moment to the next."""
+"""Number of uses of the port from one check to the next."""
 _SAID_DEG = 0.15
 _TOLD_DEG = re.compile(r"its last target, (-?[0-9.]+) deg")
 ALLOWED_DEG, ALLOWED_S, ALLOWED_BACK_DEG = 1.0, 0.5, 1.0
-"""Beyond the braking way v^2 / (2 A), beyond the braking time v / A, and back."""
+"""Allowed excess over the braking distance v^2 / (2 A) and the braking time v / A, and allowed distance back."""
 
 
 class Stopped(NamedTuple):
-    """What the reference did from the moment of a stop on; the first two beyond what braking at A takes."""
+    """The motion of the reference from a stop on; the first two are the excess over braking at A."""
 
     beyond_deg: float
     beyond_s: float
@@ -40,12 +40,12 @@ class Stopped(NamedTuple):
 
     @property
     def is_right(self) -> bool:
-        """Whether the stop kept what is promised of it."""
+        """Whether the stop is within the promised bounds."""
         return self.beyond_deg <= ALLOWED_DEG and self.beyond_s <= ALLOWED_S and self.back_deg <= ALLOWED_BACK_DEG
 
 
 class CutOff(NamedTuple):
-    """What a table did that could not be stopped: how far and how long it ran on, and how far from what was said."""
+    """The motion of a table that could not be stopped: angle and time until rest, deviation from the prediction."""
 
     way_deg: float
     rest_s: float
@@ -53,14 +53,14 @@ class CutOff(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """What could become of a table at one moment."""
+    """The possible consequences for a table at one time."""
 
     stopped: Stopped
     cut_off: CutOff
 
 
 class MomentsPort:
-    """A port onto a simulated table that calls `at_moment` before every so many uses. A copy has its own table."""
+    """A port onto a simulated table that calls `at_moment` at regular intervals. A copy has its own table."""
 
     def __init__(self, url: str, every: int, at_moment: Callable[[], None]) -> None:
         self._inner = Serial(url, timeout=0.5)
@@ -73,12 +73,12 @@ class MomentsPort:
 
     @property
     def clock(self) -> Clock:
-        """The table's time."""
+        """The time of the table."""
         return self._inner.clock
 
     @property
     def timeout(self) -> float | None:
-        """How long `read` waits, in seconds."""
+        """The maximum time that `read` waits, in seconds."""
         return self._inner.timeout
 
     @timeout.setter
@@ -87,11 +87,11 @@ class MomentsPort:
 
     @property
     def in_waiting(self) -> int:
-        """The number of bytes that can be read at once."""
+        """The number of bytes that can be read without waiting."""
         return self._inner.in_waiting
 
     def read(self, size: int, /) -> bytes:
-        """Return `size` bytes, or fewer when `timeout` has passed."""
+        """Return `size` bytes, or fewer after `timeout`."""
         self._use()
         return self._inner.read(size)
 
@@ -101,19 +101,19 @@ class MomentsPort:
         return self._inner.write(data)
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
         self._inner.close()
 
     def _use(self) -> None:
         self._uses += 1
         if self._every and self._uses % self._every == 0:
-            every, self._every = self._every, 0  # a copy is not looked at
+            every, self._every = self._every, 0  # a copy is not examined
             self._at_moment()
             self._every = every
 
 
 def stops_along(run_input: RunInput, every: int = EVERY, url: str = "emulator://") -> list[Moment]:
-    """Run a plan in virtual time; return how it would have been stopped, and run on, at every so many moments."""
+    """Run a plan in virtual time; return how it would have been stopped, and run on, at regular times."""
     wire, limits = Wire(), run_input.problem.limits
     motion = TableMotion(run_input.plan, limits)
     moments: list[Moment] = []
@@ -124,14 +124,14 @@ def stops_along(run_input: RunInput, every: int = EVERY, url: str = "emulator://
     port = MomentsPort(url, every, at_moment)
     with TableClient(port, timeout_s=0.5, decimals=wire.decimals) as table:
         bring_to(table, motion.start_deg, limits, wire)
-        moments.clear()  # of the way to the start
+        moments.clear()  # share of the travel to the start
         record = execute(table, motion, limits, wire)
     assert record.failure is None, record.failure
     return moments
 
 
 def stop_copy(client: TableClient, acceleration_deg_s2: float) -> Stopped:
-    """Stop a copy of a table, and return what its reference did."""
+    """Stop a copy of a table, and return the motion of its reference."""
     client = copy.deepcopy(client)
     table = _table_of(client)
     before = table.status()
@@ -142,7 +142,7 @@ def stop_copy(client: TableClient, acceleration_deg_s2: float) -> Stopped:
     forward = -1.0 if before.reference_speed_deg_s < 0.0 else 1.0
     ways_deg = [forward * (each.reference_deg - before.reference_deg) for each in seen]
     last = max((each.tick for each in seen if each.reference_speed_deg_s), default=before.tick)
-    assert abs(position_deg - seen[-1].reference_deg) < _SAID_DEG, "it stands where it says"
+    assert abs(position_deg - seen[-1].reference_deg) < _SAID_DEG, "it stands where reported"
     return Stopped(
         beyond_deg=max(ways_deg) - speed_deg_s**2 / (2.0 * acceleration_deg_s2),
         beyond_s=(last - before.tick) / table.facts.tick_hz - speed_deg_s / acceleration_deg_s2,
@@ -153,7 +153,7 @@ def stop_copy(client: TableClient, acceleration_deg_s2: float) -> Stopped:
 
 
 def cut_off_copy(client: TableClient) -> CutOff:
-    """Cut the line to a copy of a table, try to stop it, and let it come to rest."""
+    """Cut the line to a copy of a table, try to stop it, and wait until it rests."""
     client = copy.deepcopy(client)
     table = _table_of(client)
     before = table.status()
@@ -193,7 +193,7 @@ def bench(stream: TextIO, every: int = EVERY) -> None:
             )
         )
     header = ("scan", "stops", "deg/s", "deg beyond v^2/2A", "s beyond v/A", "deg back", "wrong",
-              "cut: deg on", "s on", "deg from what was said")  # fmt: skip
+              "cut: deg on", "s on", "deg from the reported angle")  # fmt: skip
     print_table(stream, "Stops and cut lines along the shipped plans, worst figures", header, rows)
 
 

@@ -1,4 +1,4 @@
-"""How exactly a plan arrives at the table: the stream alone, the shipped scans, and random plans in virtual time."""
+"""The accuracy of the streaming of a plan: the stream alone, the shipped scans, and random plans in virtual time."""
 
 import tempfile
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ from planner.defaults import shipped_scans
 from planner.execution.execute import Settings
 from planner.execution.stream import TimedCommand, reference_states, rounded_stream, stream
 from planner.execution.table_motion import TableMotion
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
 from planner.table.wire import Wire
@@ -37,7 +37,7 @@ PLANT = {
 
 
 class StreamFigures(NamedTuple):
-    """How a stream differs from its plan, by the controller's own rules, and how far the table runs on, in deg."""
+    """The deviation of a stream from its plan, by the controller's rules, and the run-on of the table, in deg."""
 
     at_locations_deg: float
     between_deg: float
@@ -50,7 +50,8 @@ STREAMS: dict[str, Callable[..., Sequence[TimedCommand]]] = {
     "run-on 30 deg": partial(stream, run_on_deg=30.0),
     "each rounded on its own": rounded_stream,
 }
-# The same figures of a stream that chooses S and A at the locations alone, with any run-on: measured, not kept as code.
+# The same figures of a stream that chooses S and A only at the locations, with any run-on. They were measured; the code
+# no longer exists.
 UNBOUNDED = {
     "cylinder": StreamFigures(0.0182, 0.0188, 147.6),
     "mould": StreamFigures(0.0500, 0.0500, 1110.0),
@@ -84,7 +85,7 @@ def random_plan(generator: np.random.Generator, step_s: float, duration_s: float
 
 
 def stream_figures(motion: TableMotion, commands: Sequence[TimedCommand]) -> StreamFigures:
-    """Return the greatest deviations of a stream, from the first location to the last, and its longest run-on."""
+    """Return the maximum deviations of a stream, from the first location to the last, and its maximum run-on."""
 
     def worst(times_s: FloatArray) -> float:
         angles_deg = np.array([state.angle_deg for state in reference_states(commands, times_s)])
@@ -104,7 +105,7 @@ def _bench_rounding(out: TextIO) -> None:
         generator = np.random.default_rng(0)
         motions = [TableMotion(random_plan(generator, step_s, 60.0, limits), limits) for _ in range(20)]
         rows += [_figures_of(f"{step_s:g} s, {name}", motions, limits, streamed) for name, streamed in STREAMS.items()]
-    print_table(out, "20 random minutes, one decimal: greatest deviation and run-on, in deg", _STREAM_HEADER, rows)
+    print_table(out, "20 random minutes, one decimal: maximum deviation and run-on, in deg", _STREAM_HEADER, rows)
     rows = []
     for scan in shipped_scans():
         run_input = shipped_run_input(scan)

@@ -1,4 +1,4 @@
-"""Timing for the benchmarks: the same few lines for each of them."""
+"""Common functions for timing in the benchmarks."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -6,7 +6,7 @@ from typing import TextIO
 
 
 def median_s(action: Callable[[], object], runs: int = 5) -> float:
-    """Return the median wall time of `action` over some runs, after one that does not count."""
+    """Return the median wall time of `action` over some runs, after one that is not counted."""
     action()
     durations = []
     for _ in range(runs):
@@ -17,7 +17,7 @@ def median_s(action: Callable[[], object], runs: int = 5) -> float:
 
 
 def percentile(values: Sequence[float], share: float) -> float:
-    """Return the value below which a share (0..1) of the values lies."""
+    """Return the value below which a share (0..1) of the values is."""
     ordered = sorted(values)
     return ordered[min(int(share * len(ordered)), len(ordered) - 1)]
 
@@ -31,7 +31,7 @@ def print_table(stream: TextIO, title: str, header: Sequence[str], rows: Sequenc
 
 
 def print_row(stream: TextIO, row: Sequence[str], widths: Sequence[int]) -> None:
-    """Print a row of a table with given widths, at once."""
+    """Print a row of a table with given widths, without buffering."""
     cells = (
         cell.rjust(width) if column else cell.ljust(width)
         for column, (cell, width) in enumerate(zip(row, widths, strict=True))

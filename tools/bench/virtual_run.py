@@ -1,4 +1,4 @@
-"""Run a plan on a simulated table in virtual time: what benchmarks and tests have in common."""
+"""Run a plan on a simulated table in virtual time; common to benchmarks and tests."""
 
 import time
 from collections.abc import Iterator
@@ -21,8 +21,8 @@ from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import Plan
-from planner.planning.problem import Problem
+from planner.plans.plan import Plan
+from planner.plans.problem import Problem
 from planner.table.motion import Limits
 from planner.table.wire import Wire
 from protocol import TableClient
@@ -30,7 +30,7 @@ from protocol.bench import bench_of
 
 
 class VirtualRun(NamedTuple):
-    """A run, and how long it took: in the table's time, and by the wall clock."""
+    """A run and its duration: in the table's time, and by the wall clock."""
 
     record: Record
     checked: RunVerification
@@ -41,7 +41,7 @@ class VirtualRun(NamedTuple):
 def run_in_virtual_time(
     run_input: RunInput, url: str = "emulator://", settings: Settings | None = None, wire: Wire | None = None
 ) -> VirtualRun:
-    """Run a plan on a table of its own, and verify it."""
+    """Run a plan on a new table, and verify it."""
     settings, wire = settings or Settings(), wire or Wire()
     limits = run_input.problem.limits
     motion = TableMotion(run_input.plan, limits)
@@ -68,12 +68,12 @@ def shipped_run_input(name: str) -> RunInput:
 
 
 def random_run_inputs(count: int, margin: int = 1, step_s: float = 0.1) -> Iterator[RunInput]:
-    """Yield plans across random maps of several kinds; maps that nobody can cross are passed over.
+    """Yield plans across random maps of several kinds; maps without a plan are skipped.
 
     Args:
-        count: how many.
+        count: number of plans.
         margin: samples by which the forbidden regions are widened for planning, so that the motion may deviate.
-        step_s: from one location to the next.
+        step_s: time from one location to the next.
     """
     seed = 0
     while count:
@@ -90,7 +90,7 @@ def random_run_inputs(count: int, margin: int = 1, step_s: float = 0.1) -> Itera
 
 
 def widened(configuration_map: ConfigurationMap, samples: int) -> ConfigurationMap:
-    """Return the map with its forbidden regions some samples wider along the angle."""
+    """Return the map with its forbidden regions widened along the angle by some samples."""
     allowed = configuration_map.allowed
     for shift in range(-samples, samples + 1):
         allowed = allowed & np.roll(configuration_map.allowed, shift, axis=1)
@@ -98,7 +98,7 @@ def widened(configuration_map: ConfigurationMap, samples: int) -> ConfigurationM
 
 
 def _run_input(name: str, asked: Problem, problem: Problem) -> RunInput | None:
-    """Return the plan of the problem `asked`, to be judged by `problem`; None where there is no plan."""
+    """Return the plan of the problem `asked`, for verification with `problem`; None if there is no plan."""
     plan = dynamic_programming(asked)
     return (
         RunInput(name, plan, problem, np.zeros((len(plan.angles_deg), 6)), Arm.load())

@@ -1,4 +1,4 @@
-"""The constants of a table that are reported, with their intervals, and whether a recording identifies them."""
+"""The reported constants of a table, with their intervals, and whether a recording identifies them."""
 
 from collections.abc import Callable
 from math import exp, log
@@ -15,8 +15,9 @@ from tools.tuning.linear_model import Teeth, load_ratio, speed_gain_deg_s, time_
 _SURE_95 = 1.96
 
 _IDENTIFIABLE_DEVIATION = 0.25
-"""A constant is identifiable if the readings alone, without what was assumed of it, give its logarithm with at most
-this standard deviation."""
+"""Maximum standard deviation of the logarithm of an identifiable constant, from the readings alone.
+
+Prior assumptions are not included."""
 
 
 class Constant(NamedTuple):
@@ -34,12 +35,12 @@ Derived = Callable[[TableConfig], float]
 
 
 def coulomb_Nm(config: TableConfig) -> float:
-    """Return the Coulomb friction of a driven table at the motor's shaft, its bearing's share with it."""
+    """Return the Coulomb friction of a driven table at the motor's shaft, including that of its bearing."""
     return config.friction.coulomb_Nm + config.table.bearing_friction_Nm * load_ratio(config, Teeth.DRIVING)
 
 
 def coulomb_duty(config: TableConfig) -> float:
-    """Return the duty that the Coulomb friction takes."""
+    """Return the duty that overcomes the Coulomb friction."""
     motor = config.motor
     return coulomb_Nm(config) * motor.resistance_ohm / motor.torque_constant_Nm_A / config.driver.supply_V
 
@@ -60,10 +61,10 @@ def constants_of(config: TableConfig, found: Estimate, deviation: Array, from_dr
     """Return the reported constants, by linear propagation of the covariance.
 
     Args:
-        config: What was known beforehand.
-        found: The estimate, in the units of the parameters.
-        deviation: (components,) the standard deviations that the prior has.
-        from_drive: Whether the delay is one of a drive.
+        config: the known constants.
+        found: the estimate, in the units of the parameters.
+        deviation: (components,) standard deviations of the prior.
+        from_drive: whether the delay is that of a drive.
     """
     size = len(PARAMETERS)
     result = []

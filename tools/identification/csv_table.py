@@ -1,4 +1,4 @@
-"""CSV files as programs and spreadsheets write them: byte order mark, separator, case of the names, decimal comma."""
+"""CSV files as written by programs and spreadsheets: byte order mark, separator, case of the names, decimal comma."""
 
 import csv
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
 class Row(NamedTuple):
-    """The cells of a line, by the lower-case names of their columns."""
+    """The cells of a line, by the lowercase names of their columns."""
 
     line: int
     cells: dict[str, str]
@@ -28,11 +28,11 @@ class Table(NamedTuple):
     rows: tuple[Row, ...]
 
     def has(self, names: Iterable[str]) -> bool:
-        """Return whether there are columns of all these names, in upper or lower case."""
+        """Return whether there are columns with all these names, in upper or lower case."""
         return {name.casefold() for name in names} <= {name.casefold() for name in self.names}
 
     def error(self, row: Row, problem: str) -> RecordingError:
-        """Return the error of a row."""
+        """Return the error for a row."""
         return RecordingError(f"{self.path}: line {row.line}: {problem}")
 
     def number(self, row: Row, name: str, text: str) -> float:
@@ -50,12 +50,12 @@ def read_table(path: Path) -> Table:
     """Return a CSV file.
 
     Raises:
-        RecordingError: It is not text, or a line has more cells than the header.
-        OSError: The file cannot be opened.
+        RecordingError: the file is not text, or a line has more cells than the header.
+        OSError: the file cannot be opened.
     """
     text = _text(path)
     lines = text.splitlines(keepends=True)
-    skipped = 1 if lines and lines[0].casefold().startswith("sep=") else 0  # a spreadsheet's note on the separator
+    skipped = 1 if lines and lines[0].casefold().startswith("sep=") else 0  # the separator line of a spreadsheet
     header = next((line for line in lines[skipped:] if line.strip()), "")
     separator = max(_SEPARATORS, key=header.count)
     reader = csv.reader(lines[skipped:], delimiter=separator)
@@ -72,7 +72,7 @@ def read_table(path: Path) -> Table:
 
 
 def check_decimals(table: Table, names: Iterable[str]) -> None:
-    """Refuse a file in which some numbers have a decimal point and others a decimal comma."""
+    """Refuse a file that mixes decimal points and decimal commas."""
     keys = [name.casefold() for name in names]
     first: dict[str, int] = {}
     for row in table.rows:
@@ -100,7 +100,7 @@ def _text(path: Path) -> str:
 
 
 def _row(path: Path, line: int, keys: list[str], cells: list[str], separator: str) -> Row:
-    if len(keys) > 1 and any(cells[len(keys) :]):  # a single name is not a header; who asks for columns, sees that
+    if len(keys) > 1 and any(cells[len(keys) :]):  # a single name is not a header; the check of the columns finds this
         comma = "; with a decimal comma, separate the columns by semicolons" if separator == "," else ""
         raise RecordingError(f"{path}: line {line} has {len(cells)} cells, but there are {len(keys)} columns{comma}")
     return Row(line, dict.fromkeys(keys, "") | dict(zip(keys, cells, strict=False)))

@@ -1,7 +1,7 @@
-"""A rugged function of several variables as a linear one: regression over an ensemble.
+"""A rough function of several variables as a linear one: regression over an ensemble.
 
-Counts are integers and teeth touch or not, so the simulated angles are rugged in the constants: a derivative by small
-differences is mostly noise. The regression over many points averages the ruggedness out.
+Counts are integers, and teeth are either in contact or not, so the simulated angles are a rough function of the
+constants. A derivative by small differences is mostly noise. The regression over many points averages this.
 """
 
 from collections.abc import Callable
@@ -12,13 +12,13 @@ import numpy as np
 from tools.emulated import Array
 
 _RIDGE = 1e-2
-"""Regularization of the regression, small beside the number of members."""
+"""Regularization of the regression, small compared with the number of members."""
 
 _LEAST_VARIANCE = 1e-10
 
 
 class Ensemble(NamedTuple):
-    """The function at points that are normally distributed about a center.
+    """The function at points that are normally distributed around a center.
 
     Units: a point is `center + root @ unit`, so units are standard normal.
     """
@@ -40,14 +40,14 @@ class Linear(NamedTuple):
 def drawn(
     function: Callable[[Array], Array], center: Array, covariance: Array, members: int, chance: np.random.Generator
 ) -> Ensemble:
-    """Evaluate a function at points about a center; each point has its mirror image.
+    """Evaluate a function at points around a center; each point has its mirror image.
 
     Args:
-        function: From (n,) to (readings,).
+        function: from (n,) to (readings,).
         center: (n,), the mean of the points.
         covariance: (n, n), of the points.
-        members: How many points, an even number.
-        chance: The source of randomness.
+        members: number of points, even.
+        chance: random generator.
     """
     half = chance.standard_normal((members // 2, len(center)))
     units = np.vstack([half, -half])

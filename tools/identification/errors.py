@@ -1,5 +1,5 @@
-"""What can be wrong with a recording."""
+"""The errors of a recording."""
 
 
 class RecordingError(ValueError):
-    """A recording that cannot be used; the message names the place and what is wrong with it."""
+    """A recording that cannot be used. The message states the place and the problem."""

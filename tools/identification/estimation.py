@@ -1,9 +1,9 @@
 """Estimation of the constants: the maximum of the posterior, by an iterated ensemble smoother.
 
 The posterior has many narrow peaks on long ridges. Each round simulates an ensemble of constants, fits a linear model
-to the simulated angles, maximizes the posterior of that model, and moves there if the simulation confirms it. The first
-rounds accept prediction errors of a hundredth of a degree, at which the peaks merge; the last rounds a fraction of a
-count. Several chains start from different values of the backlash; the better ones continue at each level.
+to the simulated angles, and maximizes the posterior of that model. It moves there if the simulation confirms it. The
+first rounds accept prediction errors of a hundredth of a degree, at which the peaks merge; the last rounds a fraction
+of a count. Several chains start from different values of the backlash; the better ones continue at each level.
 
 Method: Y. Chen and D. Oliver, "Levenberg-Marquardt forms of the iterative ensemble smoother", Computational Geosciences
 17 (2013) 689-703; here with the likelihood of intervals instead of a normal one.
@@ -30,7 +30,7 @@ class Level(NamedTuple):
 
 
 COMMON_LEVEL = Level(2e-2, 5, 28, 1)
-"""All chains together, before they fork."""
+"""All chains together, before they are split."""
 
 LEVELS = (
     Level(1e-2, 2, 28, 5),
@@ -43,49 +43,52 @@ FINE_LEVELS = (
     Level(6e-4, 3, 32, 2),
     Level(3e-4, 18, 36, 2, enough=3.0),
 )
-"""After the best chain has forked once more."""
+"""After the best chain has been split once more."""
 
 _FORK = (-0.13, 0.13)
-"""By how much the forked constant differs then, in standard units."""
+"""Change of the varied constant in the split, in standard units."""
 
 _FIRST_SPREAD = 0.25
 """Standard deviation of the first ensemble, as a share of the prior's."""
 
 _PATIENCE = 4
-"""For how many rounds a rise is counted."""
+"""Number of rounds over which an increase is counted."""
 
 _SAME_SHARE, _LEAST_CHAINS = 0.2, 2
 """Chains whose predictions differ by less than this share of the scale are on the same peak."""
 
 _REACH = (0.25, 4.0)
-"""Least and greatest covariance of an ensemble, as a share of the posterior's."""
+"""Minimum and maximum covariance of an ensemble, as a share of the posterior's."""
 _SHORTER, _LONGER = 0.3, 1.5
 _TRUST = 2.0
-"""How far a step leads at most, in standard deviations of the ensemble."""
+"""Maximum length of a step, in standard deviations of the ensemble."""
 _STEPS = (1.0, 0.5, 0.25)
 _HALF_TRUST = 6.0
 """The same for one half of the readings."""
 
 _FINE, _HOPELESS = 1.5, 30.0
-"""A search that ends at a scale between so many times the finest is repeated. Above, the recording is not good."""
+"""If a search ends at a scale above this multiple of the finest one, it is repeated.
+
+If the result is still above it, the recording is faulty.
+"""
 _MORE_MEMBERS = 0.5
-"""By which share the ensembles of the repetition are larger."""
+"""Share by which the ensembles of the repetition are larger."""
 
 _NEWTON_ROUNDS, _NEWTON_GAIN = 12, 0.05
 
 _EQUAL_HEIGHT = 8.0
-"""A peak that is lower by this is less likely by a factor e: the height of a narrow peak is partly chance."""
+"""A peak that is lower by this is less likely by a factor e: the height of a narrow peak is partly random."""
 
 _CONFIDENCE_SCALE_DEG = 1.5e-3
-"""The covariance counts no reading as more accurate than this: finer detail belongs to one of many narrow peaks."""
+"""The covariance assumes no reading to be more accurate than this: finer detail belongs to one of many narrow peaks."""
 _CONFIDENCE_SHARE = 5.0
-"""Nor as more accurate than so many times the scale at which the best peak explains the readings."""
+"""Also not more accurate than this multiple of the scale at which the best peak explains the readings."""
 _NEGLIGIBLE = 1e-9
 _CONFIDENCE_MEMBERS = (60, 60, 120)
 
 
 class Half(NamedTuple):
-    """What one half of the readings gives, near the peak of all, with the covariance of the likelihood and prior."""
+    """The result for one half of the readings, near the common peak, with the covariance of likelihood and prior."""
 
     vector: Array
     covariance: Array
@@ -103,7 +106,7 @@ class Estimate(NamedTuple):
 
 
 class _Chain(NamedTuple):
-    """A search: where it is, and how its next ensemble is spread."""
+    """A search: its position, and the distribution of its next ensemble."""
 
     vector: Array
     predicted_deg: Array
@@ -115,13 +118,13 @@ class _Chain(NamedTuple):
 def estimate(
     posterior: Posterior, forked: int, values: list[float], progress: Callable[[float], None] = lambda _: None
 ) -> Estimate:
-    """Return the highest peak found, with a covariance that includes other peaks of about its height.
+    """Return the highest peak found, with a covariance that includes other peaks of similar height.
 
     Args:
-        posterior: The problem.
-        forked: The index of the constant in which the chains differ at first.
-        values: Its value in each chain.
-        progress: Called with the share that is done.
+        posterior: the problem.
+        forked: index of the constant in which the chains differ at first.
+        values: its value in each chain.
+        progress: called with the finished share.
     """
     chance, chains = np.random.default_rng(0), _search(posterior, forked, values, 0, progress)
     least_deg = FINE_LEVELS[-1].least_deg
@@ -138,11 +141,11 @@ def _search(
     """Return the ends of the best chains.
 
     Args:
-        posterior: The problem.
-        forked: The index of the constant in which the chains differ at first.
-        values: Its value in each chain.
+        posterior: the problem.
+        forked: index of the constant in which the chains differ at first.
+        values: its value in each chain.
         repetition: 0 for the first search, 1 for the second, which has larger and other ensembles.
-        progress: Called with the share that is done.
+        progress: called with the finished share.
     """
     chance, members = np.random.default_rng(repetition), (1.0 + _MORE_MEMBERS * repetition)
     levels = (COMMON_LEVEL, *LEVELS, *FINE_LEVELS)
@@ -167,7 +170,7 @@ def _search(
 
 
 def _survivors(chains: list[_Chain], level: Level) -> list[_Chain]:
-    """Return the highest chains; of those that predict the same only one, but two chains at least."""
+    """Return the highest chains. Of chains with the same predictions only one is kept, but at least two chains."""
     first, *others = sorted(chains, key=lambda chain: -chain.height)
     kept: list[_Chain] = [first]
     copies: list[_Chain] = []
@@ -185,7 +188,7 @@ def _forked(chain: _Chain, first: Array, index: int, value: float) -> _Chain:
 
 
 def _advanced(posterior: Posterior, chain: _Chain, level: Level, chance: np.random.Generator) -> _Chain:
-    """Return a chain after one round: ensemble, linear model, step, and the spread of the next ensemble."""
+    """Return a chain after one round: ensemble, linear model, step, and the distribution of the next ensemble."""
     size, drift = posterior.size, chain.vector[posterior.size :]
     ensemble = drawn(posterior.predict, chain.vector[:size], chain.covariance, level.members, chance)
     model = LinearPosterior.of(posterior, ensemble, drift)
@@ -223,10 +226,10 @@ def _advanced(posterior: Posterior, chain: _Chain, level: Level, chance: np.rand
 
 
 def _with_covariance(posterior: Posterior, chains: list[_Chain], chance: np.random.Generator) -> Estimate:
-    """Return the end of the highest chain with the covariance about it; other chains count by their heights.
+    """Return the end of the highest chain with its covariance; other chains are weighted by their heights.
 
-    What the linear model leaves out is a model error. It adds to the variance of the likelihood's slope, so its
-    information is Godambe's, H (H + S)^-1 H, with H the negative Hessian and S that variance.
+    The part that the linear model omits is a model error. It adds to the variance of the likelihood's slope. So its
+    information is Godambe's, H (H + S)^-1 H, with the negative Hessian H and that variance S.
     """
     best, *others = chains
     size, drift = posterior.size, best.vector[posterior.size :]

@@ -1,18 +1,19 @@
-"""The motion that a recording needs: each part brings out another constant of the table.
+"""The motion for a recording: each part makes another constant of the table identifiable.
 
-| part | brings out |
+| part | identifies |
 |---|---|
 | fast swings | gain: the lag of the encoder behind the reference grows with the speed |
 | slow swings | Coulomb friction and stiction: the lag jumps with the direction |
-| quick swings | inertia, and backlash: the teeth part, and meet again |
+| short swings | inertia, and backlash: the teeth separate and touch again |
 
-A burst is a row of swings to and fro about home, from rest to rest. A swing never reaches the top speed: it speeds up
-over half its way and brakes over the other, so one gain set alone is at work. Amid the braking the next target is sent,
-on the other side: the table brakes on as it would have, and turns. So the time of that command changes nothing; the
-firmware alone times a burst, from its first command on. At the end of a burst the table comes to rest, and the
-regulator forgets its integral: what the lag was before does not add to what it is afterwards.
+A burst is a sequence of swings back and forth around home, from rest to rest. A swing never reaches the maximum speed.
+The table accelerates over half of the travel and brakes over the other half, so only one gain set is used. The next
+target, on the other side, is sent during the braking: the table continues to brake, and reverses. So the time of that
+command has no effect. Only the firmware determines the timing of a burst, from its first command on. At the end of a
+burst the table comes to rest, and the PID resets its integral: the lag before that does not add to the lag after it.
 
-The turning points are a degree apart at least: within a wider gap the table would float, and no one could tell where.
+The reversal points are at least a degree apart. Within a wider gap the table would float, and its position would be
+unknown.
 """
 
 from math import copysign, floor, sqrt
@@ -20,18 +21,21 @@ from random import Random
 from typing import NamedTuple
 
 REST_S = 0.5
-"""For how long the table has time to settle after a burst."""
+"""Time for the table to settle after a burst."""
 
 _MOTION_S = 3.5
-"""About how long the motion of a burst is: with many in a recording, errors of the first commands' times cancel."""
+"""Approximate duration of the motion of a burst.
+
+With many bursts in a recording, errors of the first commands' times cancel.
+"""
 
 _LEAST_WIDTH_DEG = 1.0
 _BRAKING = 0.75
-"""When the next target is sent, as a share of a swing's duration: in the middle of the braking."""
+"""Time of the next target, as a share of a swing's duration: in the middle of the braking."""
 
 
 class Move(NamedTuple):
-    """A swing, and when its target is sent. Times count from the burst's first command, angles from home."""
+    """A swing, and the time of its target. Times count from the burst's first command, angles from home."""
 
     send_s: float
     begin_s: float
@@ -56,7 +60,7 @@ class Burst(NamedTuple):
 
     @property
     def duration_s(self) -> float:
-        """With the rest."""
+        """Duration including the rest."""
         return self.end_s + REST_S
 
     def reference(self, time_s: float) -> Reference:
@@ -73,7 +77,7 @@ class Burst(NamedTuple):
 
 
 class Swing(NamedTuple):
-    """A part of the excitation, in shares of the whole duration and of the greatest speed and acceleration."""
+    """A part of the excitation, in shares of the whole duration and of the maximum speed and acceleration."""
 
     duration: float
     speed: float
@@ -93,10 +97,10 @@ def excitation(duration_s: float, speed_deg_s: float, acceleration_deg_s2: float
     """Return the bursts of a recording.
 
     Args:
-        duration_s: How long it lasts, about.
-        speed_deg_s: The greatest speed that may be used.
-        acceleration_deg_s2: The greatest acceleration that may be used.
-        seed: Of the irregular widths, which keep the readings from falling on the same angles again and again.
+        duration_s: approximate duration.
+        speed_deg_s: maximum speed.
+        acceleration_deg_s2: maximum acceleration.
+        seed: random seed of the irregular widths, which prevent readings at the same angles.
     """
     chance = Random(seed)  # noqa: S311  # spreads the readings
     bursts: list[Burst] = []
@@ -127,5 +131,5 @@ def _burst(swing: Swing, most_deg_s: float, most_deg_s2: float, chance: Random) 
 
 
 def _swing_s(way_deg: float, acceleration_deg_s2: float) -> float:
-    """Return how long it takes to speed up over half the way, and to brake over the other."""
+    """Return the time for accelerating over half of the travel, and braking over the other half."""
     return 2.0 * sqrt(way_deg / acceleration_deg_s2)

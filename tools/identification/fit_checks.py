@@ -1,4 +1,4 @@
-"""Whether a fit is to be believed: the model must explain the readings, and the motor should be the configured one."""
+"""Check the plausibility of a fit: the model must explain the readings, and the motor should be the configured one."""
 
 from math import log, pi, sqrt
 from typing import NamedTuple
@@ -12,22 +12,25 @@ from tools.identification.identify_table import Identified
 from tools.identification.parameters import PARAMETERS, with_logarithms
 
 MOST_UNEXPLAINED_DEG = 1e-4
-"""The root mean square beyond rounding that a good recording stays below; the largest of 23 tables is 5e-5."""
+"""Maximum root mean square beyond rounding for a good recording; the largest of 23 tables is 5e-5."""
 
 _STRIPES = 30
 _WHOLE = 0.5
-"""Errors in at least this share of the recording are said to be everywhere."""
+"""Errors in at least this share of the recording are reported as everywhere."""
 
 MOST_APART = {"gain": 1.5, "time constant": 1.5, "Coulomb friction as duty": 2.0, "backlash": 2.0}
-"""By how many standard deviations the halves may differ. The deviations include the model error, so the halves of
-steady tables differ by less than half of one in general (largest of 23 tables: 1.0, 1.0, 1.1 and 1.5)."""
+"""Maximum difference of the halves, in standard deviations.
+
+The deviations include the model error. So the halves of steady tables generally differ by less than half of one
+(largest of 23 tables: 1.0, 1.0, 1.1 and 1.5).
+"""
 
 _AT_ODDS = log(1.07)
-"""A gear ratio that is wrong by a tenth gives a torque constant that is wrong by a tenth, with no other sign."""
+"""A gear ratio with an error of a tenth gives a torque constant with an error of a tenth, and no other sign."""
 
 
 class Halves(NamedTuple):
-    """A constant as each half of the recording gives it, and by how many standard deviations the two differ."""
+    """A constant from each half of the recording, and the difference of the two in standard deviations."""
 
     name: str
     unit: str
@@ -41,7 +44,7 @@ def check_fit(found: Identified) -> None:
     """Refuse a fit that does not explain its recording.
 
     Raises:
-        RecordingError: What is left unexplained is more than rounding, or the halves of the recording disagree.
+        RecordingError: the unexplained part is more than rounding, or the halves of the recording disagree.
     """
     _check_residual(found)
     for half in halves_of(found):
@@ -54,7 +57,7 @@ def check_fit(found: Identified) -> None:
 
 
 def halves_of(found: Identified) -> tuple[Halves, ...]:
-    """Return the constants that are compared, as each half of the recording gives them."""
+    """Return the compared constants from each half of the recording."""
     return tuple(_halves(found, name, unit, function) for name, unit, function in DERIVED if name in MOST_APART)
 
 
@@ -71,7 +74,7 @@ def _halves(found: Identified, name: str, unit: str, function: Derived) -> Halve
 
 
 def unexplained_rms_deg(found: Identified) -> float:
-    """Return the root mean square of what rounding does not explain."""
+    """Return the root mean square of the part that rounding does not explain."""
     return float(np.sqrt(np.mean(found.unexplained_deg**2)))
 
 
@@ -81,14 +84,14 @@ def _check_residual(found: Identified) -> None:
         return
     raise RecordingError(
         f"the model does not explain the recording: beyond rounding {rms_deg:.2g} deg rms ({rms_deg / count_deg:.2g} "
-        f"counts) are left (allowed {MOST_UNEXPLAINED_DEG:g} deg), {_where(found)}; a step or drift of the clock, a "
-        "changed load or table, a table that was turned by hand, an encoder that lost counts, other gains, gears or "
-        "encoder than configured, or a search that ended in a wrong place: record again"
+        f"counts) are left (allowed {MOST_UNEXPLAINED_DEG:g} deg), {_where(found)}; possible causes: "
+        "a step or drift of the clock, a changed load or table, a table that was turned by hand, an encoder that lost "
+        "counts; other gains, gears or encoder than configured; a search with a wrong result; record again"
     )
 
 
 def _where(found: Identified) -> str:
-    """Return where the recording differs most from the model."""
+    """Return the place at which the recording differs most from the model."""
     time_s = found.time_s
     edges = np.linspace(time_s[0], time_s[-1], _STRIPES + 1)
     stripe = np.clip(np.searchsorted(edges, time_s, side="right") - 1, 0, _STRIPES - 1)
@@ -100,7 +103,7 @@ def _where(found: Identified) -> str:
 
 
 def motor_at_odds(found: Identified, assumed: TableConfig) -> str:
-    """Return in a sentence how the motor found differs from the configured one, or nothing if it does not."""
+    """Return in a sentence how the estimated motor differs from the configured one, or an empty text."""
     before, after = assumed.motor.torque_constant_Nm_A, found.config.motor.torque_constant_Nm_A
     if abs(log(after / before)) <= _AT_ODDS:
         return ""

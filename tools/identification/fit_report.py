@@ -1,4 +1,4 @@
-"""What an identification found: as text, as a configuration file, and as a report with the fit shown."""
+"""The results of an identification: as text, as a configuration file, and as a report with the fit."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,19 +14,21 @@ from tools.identification.identify_table import Identified
 from tools.identification.parameters import PARAMETERS
 
 _GAP_S = 0.5
-"""Readings farther apart are not joined by a line."""
+"""Readings farther apart are not connected by a line."""
 
 
 def verdict(constant: Constant) -> str:
     """Return a constant with its interval in one line."""
     line = f"{constant.name}: {constant.value:.4g} ({constant.low:.4g} .. {constant.high:.4g}) {constant.unit}"
-    return line if constant.identifiable else f"{line}  [not identifiable from this recording: mostly what was assumed]"
+    return (
+        line if constant.identifiable else f"{line}  [not identifiable from this recording: mostly the assumed value]"
+    )
 
 
 def table_toml(found: Identified, warning: str = "") -> str:
-    """Return the identified table, with what was known of it beforehand, as a file for `--config`."""
+    """Return the identified table, with its known constants, as a file for `--config`."""
     lines = [f"Warning: {warning}"] if warning else []
-    lines += ["Identified from a recording. Torques and inertias hold for the motor resistance that was assumed."]
+    lines += ["Identified from a recording. Torques and inertias are valid for the assumed motor resistance."]
     lines += [verdict(constant) for constant in found.constants]
     estimated = frozenset(f"{parameter.section}.{parameter.key}" for parameter in PARAMETERS)
     return config_toml(found.config, "\n".join(lines), always=estimated)
@@ -52,7 +54,7 @@ def fit_report(
             headline(_believed(found), is_good=True),
             paragraph(f"From {source}: {counted(len(found.time_s), 'reading')} used, over {found.time_s[-1]:.1f} s."),
             paragraph(
-                f"Not identifiable from this recording: {', '.join(missing)}. Their values are mostly what was assumed."
+                f"Not identifiable from this recording: {', '.join(missing)}. Their values are mostly the assumed ones."
                 if missing
                 else "Every constant is identifiable."
             ),
@@ -60,8 +62,8 @@ def fit_report(
             heading("Constants, with 95 % confidence intervals"),
             table(("constant", "estimate", "interval", ""), rows),
             paragraph(
-                "The intervals hold for the model's structure and for what was assumed: motion alone cannot tell "
-                f"the motor's resistance, so torques and inertias hold for the assumed "
+                "The intervals are valid for the structure of the model and its assumptions. Motion alone does not "
+                f"identify the motor's resistance, so torques and inertias are valid for the assumed "
                 f"{assumed.motor.resistance_ohm:g} ohm."
             ),
             heading("The halves of the recording"),
@@ -81,7 +83,7 @@ def fit_report(
             heading("The fit"),
             figure(
                 svg_of(_fit_figure(found)),
-                "Recorded and predicted angle of the table over time; below it what the model leaves unexplained.",
+                "Recorded and predicted angle of the table over time; below it the unexplained part.",
                 "Recorded and predicted angles, and the distance of the predicted angles from the readings' intervals.",
             ),
         ],
@@ -90,7 +92,7 @@ def fit_report(
 
 
 def _believed(found: Identified) -> str:
-    """Return why the fit is to be believed; one that is not has no report."""
+    """Return why the fit is plausible; an implausible fit has no report."""
     rms_deg, count_deg = unexplained_rms_deg(found), 360.0 / found.config.counts_per_turn
     most = max(halves_of(found), key=lambda half: half.apart / half.allowed)
     return (

@@ -1,4 +1,4 @@
-"""From a recording to a table's constants with their confidence intervals."""
+"""From a recording to the constants of a table with their confidence intervals."""
 
 from collections.abc import Callable
 from math import log
@@ -18,7 +18,7 @@ _BACKLASH_STARTS_ARCMIN = (2.0, 5.0, 11.0, 22.0, 45.0)
 
 
 class Identified(NamedTuple):
-    """The outcome."""
+    """The result."""
 
     config: TableConfig
     constants: tuple[Constant, ...]
@@ -26,7 +26,7 @@ class Identified(NamedTuple):
     time_s: Array  # of what was compared
     seen_deg: Array
     predicted_deg: Array
-    unexplained_deg: Array  # how far the predicted angles are outside the intervals of the readings
+    unexplained_deg: Array  # distance of the predicted angles from the intervals of the readings
 
 
 def identify(
@@ -34,12 +34,12 @@ def identify(
     recording: WireRecording | DriveRecording,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Identified:
-    """Return the constants of the table that was recorded.
+    """Return the constants of the recorded table.
 
     Args:
-        config: What is known beforehand: the controller and its gains, the encoder, the datasheet.
-        recording: A recording that `recording_checks` let pass.
-        progress: Called with the share that is done.
+        config: known constants: the controller and its gains, the encoder, the datasheet.
+        recording: a recording that passed `recording_checks`.
+        progress: called with the finished share.
     """
     problem = problem_of(config, recording)
     mean, deviation = problem.prior.mean[BACKLASH], problem.prior.deviation[BACKLASH]

@@ -1,9 +1,9 @@
-"""How far a table is behind its reference, told from its readings while it is being recorded.
+"""The lag of a table behind its reference, estimated from its readings during the recording.
 
-A reading is rounded, mostly to a tenth of a degree. It tells most when the table is about to pass from one rounded
-value to the next, so the recorder wants to predict that. The lag is taken to be linear in speed, direction and
-acceleration; each reading tells an interval in which it was. That is a Kalman filter whose measurements are intervals:
-the predicted normal distribution, cut to the interval, is replaced by a normal one of the same mean and variance.
+A reading is rounded, mostly to a tenth of a degree. It contains most information when the table is about to pass from
+one rounded value to the next, so the recorder predicts that time. The lag is assumed to be linear in speed, direction
+and acceleration; each reading gives an interval for it. This is a Kalman filter whose measurements are intervals. The
+predicted normal distribution, cut to the interval, is replaced by a normal one of the same mean and variance.
 """
 
 from collections.abc import Callable
@@ -20,24 +20,24 @@ _UNPREDICTED_DEG = 0.006
 _FORGETTING, _SURPRISED = 1.001, 1.1
 _SURPRISE = 1e-3
 _WIDEST = 30.0
-"""The largest deviation, in times the first one: a table that has slipped surprises without end."""
+"""Maximum deviation, as a multiple of the first one: a table that has slipped deviates without limit."""
 _LOOK_S = 0.002
 
 
 class LagTracker:
-    """An estimate of the lag that follows the readings."""
+    """An estimate of the lag, updated by the readings."""
 
     def __init__(self) -> None:
-        """Begin with the lag of a usual table."""
+        """Start with the lag of a usual table."""
         self._mean = np.array(_MEAN)
         self._covariance = np.diag(np.square(_DEVIATION))
 
     def lag_deg(self, reference: Reference) -> float:
-        """Return how far behind the reference the encoder is now."""
+        """Return the present lag of the encoder behind the reference."""
         return float(_features(reference) @ self._mean)
 
     def learn(self, reference: Reference, low_deg: float, high_deg: float) -> None:
-        """Take in that the lag was in an interval."""
+        """Update the estimate: the lag was in an interval."""
         if reference.speed_deg_s == 0.0:
             return
         features = _features(reference)
@@ -61,7 +61,7 @@ class LagTracker:
 
 
 def next_passage_s(position_deg: Callable[[float], float], step_deg: float, begin_s: float, within_s: float) -> float:
-    """Return when a position next passes from one rounded value to the next, or `begin_s` when not soon."""
+    """Return the time of the next change of a rounded position, or `begin_s` if it is not soon."""
     time_s, at = begin_s, position_deg(begin_s) / step_deg - 0.5
     while time_s < begin_s + within_s:
         later = position_deg(time_s + _LOOK_S) / step_deg - 0.5

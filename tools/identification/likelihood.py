@@ -1,8 +1,8 @@
 """The likelihood of quantized readings: each reading is an interval that contained the angle.
 
-The prediction error is taken as logistic with scale s: a reading has the probability F((high - x)/s) - F((low - x)/s),
-with F the logistic function and x the predicted angle. A reading near the edge of its interval constrains the angle far
-more than the width of the interval suggests. An outlier counts linearly only. The logarithm is concave in x, and its
+The prediction error has a logistic distribution with scale s: a reading has the probability F((high - x)/s) - F((low -
+x)/s), with the logistic function F and the predicted angle x. A reading near the edge of its interval constrains the
+angle far more than the width of the interval. An outlier counts only linearly. The logarithm is concave in x, and its
 derivatives are simple.
 """
 
@@ -14,7 +14,7 @@ from scipy.special import expit
 from tools.emulated import Array
 
 Scale = float | Array
-"""Of the prediction error, in deg: of all readings, or (readings,) of each."""
+"""Scale of the prediction error in deg: one for all readings, or (readings,)."""
 
 
 class Intervals(NamedTuple):
@@ -42,12 +42,12 @@ class Intervals(NamedTuple):
         return (below - above) / scale_deg, (below * (1.0 - below) + above * (1.0 - above)) / scale_deg**2
 
     def best_scale_deg(self, angle_deg: Array, least_deg: float) -> float:
-        """Return the most likely scale, from a grid that begins at `least_deg`."""
+        """Return the most likely scale, from a grid that starts at `least_deg`."""
         scales = least_deg * np.geomspace(1.0, 1000.0, 31)
         return float(max(scales, key=lambda scale_deg: self.log_likelihood(angle_deg, scale_deg)))
 
     def outside_deg(self, angle_deg: Array) -> Array:
-        """Return how far angles are above (or, negative, below) the intervals."""
+        """Return the distance of angles above (or, negative, below) the intervals."""
         return angle_deg - np.clip(angle_deg, self.low_deg, self.high_deg)
 
     def _outside(self, angle_deg: Array, scale_deg: Scale) -> tuple[Array, Array]:

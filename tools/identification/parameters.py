@@ -1,4 +1,4 @@
-"""The constants that a recording is asked for, as keys of the table's configuration."""
+"""The constants to estimate from a recording, as keys of the table's configuration."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -11,8 +11,8 @@ from emulator.config.table_config import TableConfig
 class Parameter(NamedTuple):
     """A positive constant, estimated as its logarithm.
 
-    `spread` is the standard deviation of that logarithm that is taken for granted beforehand, about the configured
-    value: 0.2 is 20 %. It is wide for what the recording is to tell, narrow for what it can hardly tell.
+    `spread` is the prior standard deviation of that logarithm, around the configured value: 0.2 is 20 %. It is wide for
+    constants that the recording identifies, narrow for those that it hardly identifies.
     """
 
     section: str
@@ -50,11 +50,11 @@ PARAMETERS = (
 )
 
 BACKLASH = 3
-"""The backlash's place: the one constant from several values of which the search begins."""
+"""The index of the backlash: the search starts from several values of this constant."""
 
 
 def with_logarithms(config: TableConfig, logarithms: Iterable[float]) -> TableConfig:
-    """Return the configuration with the values whose logarithms these are, in the order of `PARAMETERS`."""
+    """Return the configuration with values given by their logarithms, in the order of `PARAMETERS`."""
     for parameter, logarithm in zip(PARAMETERS, logarithms, strict=True):
         config = parameter.set_log(config, logarithm)
     return config

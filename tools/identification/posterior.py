@@ -1,4 +1,4 @@
-"""The posterior of the constants, and the same with a linear model of the angles, which has a maximum to step to."""
+"""The posterior of the constants, and an approximation with a linear model of the angles, which has a maximum."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -11,32 +11,32 @@ from tools.identification.ensemble import Ensemble, regressed
 from tools.identification.likelihood import Intervals, Scale
 
 Predict = Callable[[Array], Array]
-"""Returns the angles (deg) that the readings should show, for a vector of constants, without the drift."""
+"""Returns the expected angles (deg) of the readings, for a vector of constants, without the drift."""
 
 _DRIFT_ROUNDS, _DRIFT_GAIN = 6, 0.01
 
 _LEAST_INFORMATION = 0.05
-"""The share of an information that is left at least after noise is subtracted from it."""
+"""Minimum share of an information that remains after noise is subtracted from it."""
 
 
 class Posterior(NamedTuple):
     """The problem: readings and model.
 
-    A vector holds the constants, then the coefficients of the drift, both in standard units: beforehand each component
+    A vector contains the constants, then the coefficients of the drift, both in standard units. A priori each component
     is normally distributed with mean 0 and standard deviation 1.
     """
 
     readings: Intervals
     predict: Predict
     drift: Array  # (readings, coefficients)
-    size: int  # how many constants
+    size: int  # number of constants
 
     def height(self, vector: Array, predicted_deg: Array, scale_deg: Scale) -> float:
         """Return the logarithm of the posterior."""
         return self.readings.log_likelihood(predicted_deg, scale_deg) - 0.5 * float(vector @ vector)
 
     def with_drift(self, constants: Array, drift: Array, scale_deg: float) -> tuple[Array, Array]:
-        """Return the vector with the likeliest drift, by Newton's method from a drift near it, and its angles."""
+        """Return the vector with the most likely drift, by Newton's method from a nearby drift, and its angles."""
         basis = np.vstack([np.zeros((self.size, len(drift))), np.eye(len(drift))])
         model = LinearPosterior(
             self, np.concatenate([constants, drift]), basis, self.predict(constants) + self.drift @ drift, self.drift
@@ -53,11 +53,11 @@ class LinearPosterior(NamedTuple):
     basis: Array  # vector = origin + basis @ move
     still_deg: Array
     slopes: Array  # angles = still + slopes @ move
-    residual: Array = np.empty((0, 0))  # (members, readings), what the linear model leaves out
+    residual: Array = np.empty((0, 0))  # (members, readings), the part that the linear model omits
 
     @classmethod
     def of(cls, posterior: Posterior, ensemble: Ensemble, drift: Array) -> "LinearPosterior":
-        """Return the posterior about the center of an ensemble and a drift."""
+        """Return the posterior around the center of an ensemble and a drift."""
         linear = regressed(ensemble)
         return cls(
             posterior,
@@ -73,7 +73,7 @@ class LinearPosterior(NamedTuple):
         return self.posterior.height(self.origin + self.basis @ move, self.still_deg + self.slopes @ move, scale_deg)
 
     def unexplained_deg(self) -> Array:
-        """Return the standard deviation (readings,) of what the linear model leaves out."""
+        """Return the standard deviation (readings,) of the part that the linear model omits."""
         members, size = len(self.residual), self.posterior.size
         result: Array = np.sqrt(np.sum(self.residual**2, axis=0) / max(members - size - 1, 1))
         return result
@@ -96,10 +96,10 @@ class LinearPosterior(NamedTuple):
         return result
 
     def measured_information(self, scale_deg: float) -> tuple[Array, Array]:
-        """Return the likelihood's negative Hessian, and the variance of its slope by what the linear model leaves out.
+        """Return the likelihood's negative Hessian, and the variance of its slope by the omitted part.
 
-        The residual also adds noise to the slopes of the linear model. The information that this noise seems to give
-        is subtracted.
+        The residual also adds noise to the slopes of the linear model. The apparent information of this noise is
+        subtracted.
         """
         _, weight = self.posterior.readings.derivatives(self.still_deg, scale_deg)
         members, size = len(self.residual), self.posterior.size

@@ -1,4 +1,4 @@
-"""The estimation problem that a recording poses: readings, model and prior."""
+"""The estimation problem of a recording: readings, model and prior."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -23,18 +23,22 @@ from tools.identification.simulation import (
 from tools.identification.timing import Timing, timing
 
 _WIRE_DELAY_S = (0.0, 5e-6)
-"""Mean and deviation: commands and readings both take effect at the end of a tick, so no delay is between them. A delay
-that is free to explain model errors takes some of the gain with it."""
+"""Mean and deviation: commands and readings both take effect at the end of a tick, so there is no delay between them.
+
+A free delay would absorb model errors together with some of the gain.
+"""
 
 _OFFSET_DEG = (0.0, 0.02)
 """Mean and deviation of the drift's knots."""
 
 _ENCODER_PHASE, _GAP_SHARE = (0.5, 0.3), (0.0, 0.6)
-"""Mean and deviation of the table's standstill before the first command, as wide as the range."""
+"""Mean and deviation of the table's rest position before the first command, as wide as the range."""
 
 _DRIFT_KNOT_S = 6.0
-"""The encoder's distance to the reference drifts: at each change of the gain set the regulator keeps its output, and so
-forgets a little of that distance. The drift is estimated as straight pieces of this length."""
+"""Length of a straight piece of the drift.
+
+The encoder's distance from the reference drifts: at each change of the gain set the PID keeps its output, and so loses
+a little of that distance."""
 
 _DRIVE_DELAY_TICKS = (1.0, 1.0)
 """Mean and deviation: a new duty waits for a tick in the PWM's buffer."""
@@ -42,18 +46,18 @@ _DRIVE_DELAY_TICKS = (1.0, 1.0)
 _DRIVE_WINDOW_S = 0.008
 
 _WIDEST_GAP_DEG = 1.5
-"""A drive's readings count once the table has moved so far: before, it is unknown where the teeth stand in the gap."""
+"""A drive's readings count after this travel: before it, the position of the teeth in the gap is unknown."""
 
 
 class Prior(NamedTuple):
-    """What is known beforehand of each component of the vector: mean and standard deviation."""
+    """The prior of each component of the vector: mean and standard deviation."""
 
     mean: Array
     deviation: Array
 
 
 class Problem(NamedTuple):
-    """What is compared, and the posterior in the prior's standard units."""
+    """The compared readings, and the posterior in the prior's standard units."""
 
     time_s: Array
     seen_deg: Array
@@ -81,7 +85,7 @@ def _problem(
 
 
 def _prior(config: TableConfig, *others: tuple[float, float]) -> Prior:
-    """Return means and deviations of the configured constants, and of what comes after them."""
+    """Return means and deviations of the configured constants, and of the additional components."""
     constants = [(parameter.log_of(config), parameter.spread) for parameter in PARAMETERS]
     return Prior(*np.array([*constants, *others]).T)
 
@@ -104,7 +108,7 @@ def _wire_problem(config: TableConfig, recording: WireRecording) -> Problem:
 
 
 def _intervals(config: TableConfig, recording: WireRecording, seen_deg: Array) -> Intervals:
-    """Return what replies tell: a reply is a rounded count, so the encoder stood between two counts."""
+    """Return the information of replies: a reply is a rounded count, so the encoder was between two counts."""
     count_deg, half = config.counts_per_deg, recording.resolution_deg / 2.0
     low = np.ceil((seen_deg - half) * count_deg - 1e-6) / count_deg
     high = (np.floor((seen_deg + half) * count_deg + 1e-6) + 1.0) / count_deg
@@ -114,7 +118,7 @@ def _intervals(config: TableConfig, recording: WireRecording, seen_deg: Array) -
 def _trusted(
     config: TableConfig, recording: WireRecording, at: Timing, motions: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
-    """Tell which readings are to be trusted: their own times, and when the table set off from its last rest."""
+    """Return which readings are reliable: by their times, and by the start of the table from its last rest."""
     doubtful = at.doubtful_commands[[sent.verb in "PR" for sent in recording.commands]]
     sets_off = from_rest(config, motions)
     last = np.searchsorted(motions[sets_off, 0], at.readings, side="right") - 1
@@ -129,7 +133,7 @@ def _drift(time_s: Array) -> Array:
 
 
 def _drive_problem(config: TableConfig, recording: DriveRecording) -> Problem:
-    """Compare the way made in each short window: positions would drift apart without a loop that holds them."""
+    """Compare the travel in each short window: positions would drift apart without a control loop."""
     tick_hz = config.control.tick_hz
     duty, position_deg = ticks_of(recording, tick_hz)
     window = max(1, round(_DRIVE_WINDOW_S * tick_hz))

@@ -21,23 +21,23 @@ def record(
     progress: Callable[[float], None] = lambda _: None,
     check: Callable[[WireRecording], None] = lambda _: None,
 ) -> WireRecording:
-    """Return what the table answers while it makes the bursts; it ends where it began.
+    """Return the replies of the table during the bursts; it ends at its start position.
 
     Args:
-        client: A client that no one else uses, sending one decimal.
-        bursts: From `excitation`.
-        speed_deg_s: The top speed, which no swing reaches.
-        baud: Of the line: a command counts from when it is complete at the table.
-        progress: Called with the share that is done.
-        check: Called after each burst with the recording so far; it may raise to end a recording that is of no use.
+        client: a client that nothing else uses, with one decimal.
+        bursts: from `excitation`.
+        speed_deg_s: the maximum speed, which no swing reaches.
+        baud: baud rate of the line: a command counts from its complete arrival at the table.
+        progress: called with the finished share.
+        check: called after each burst with the recording so far; it may raise to end a useless recording.
 
     Raises:
-        TableError: The table refused a command, or went silent; it was stopped, and a note says how that went.
+        TableError: the table refused a command, or did not reply. It was stopped, and a note states the result.
     """
     home_deg = round(client.position_deg(), 1)
     length_s = sum(burst.duration_s for burst in bursts)
     try:
-        client.set_acceleration(max(burst.acceleration_deg_s2 for burst in bursts))  # a stop may take that
+        client.set_acceleration(max(burst.acceleration_deg_s2 for burst in bursts))  # a stop may take that long
         client.move_to(home_deg)
         client.wait_until_at(home_deg)
         recorder = _Recorder(client, baud, home_deg)
@@ -55,7 +55,7 @@ def record(
 
 
 class _Recorder:
-    """Notes what is said, when each line was complete at the table, and when its reply was here."""
+    """Records each line, its time of complete arrival at the table, and the time of its reply."""
 
     def __init__(self, client: TableClient, baud: int, home_deg: float) -> None:
         self._client = client
@@ -82,7 +82,7 @@ class _Recorder:
         self._poll(burst, begin_s, begin_s + burst.duration_s)
 
     def send(self, verb: str, value: float) -> float:
-        """Send a command, and return when it was complete at the table."""
+        """Send a command, and return the time of its complete arrival at the table."""
         value = round(value, 1)
         time_s = self.now_s() + self._line_s(f"{verb} {value:.1f}\r")
         {"S": self._client.set_speed, "A": self._client.set_acceleration, "P": self._client.move_to}[verb](value)
@@ -90,7 +90,7 @@ class _Recorder:
         return time_s
 
     def read(self) -> tuple[float, float]:
-        """Ask for the position; return it, and when the question was complete at the table."""
+        """Read the position; return it, and the time at which the command was complete at the table."""
         time_s = self.now_s() + self._line_s("H\r")
         position_deg = self._client.position_deg()
         self._times_s.append(time_s)
@@ -104,7 +104,10 @@ class _Recorder:
         )
 
     def _poll(self, burst: Burst, begin_s: float, end_s: float) -> None:
-        """Read when the table is about to pass from one decimal to the next: then a rounded reading tells most."""
+        """Read when the table is about to pass from one decimal to the next.
+
+        Such a rounded reading contains most information.
+        """
 
         def position_deg(time_s: float) -> float:
             reference = burst.reference(time_s - begin_s)

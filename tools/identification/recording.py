@@ -41,20 +41,20 @@ class Sent(NamedTuple):
     time_s: float
     verb: str
     value: float
-    reply_s: float = nan  # when its reply was complete, if it is known
+    reply_s: float = nan  # time of its complete reply, if known
 
 
 class WireRecording(NamedTuple):
-    """Commands, and positions that were polled, in the order of their times."""
+    """Commands, and polled positions, in the order of their times."""
 
     commands: tuple[Sent, ...]
     time_s: Array
     position_deg: Array
-    reply_s: Array  # when the replies were complete; NaN where it is not known
+    reply_s: Array  # times of the complete replies; NaN if unknown
 
     @property
     def resolution_deg(self) -> float:
-        """The step of the decimal grid on which all positions lie: 0.1 for replies with one decimal."""
+        """The step of the decimal grid of all positions: 0.1 for replies with one decimal."""
         decimals = 1
         while decimals < _MOST_DECIMALS and np.abs(self.position_deg - self.position_deg.round(decimals)).max() > 1e-9:
             decimals += 1
@@ -84,11 +84,12 @@ def write_recording(path: Path, recording: WireRecording) -> None:
 
 
 def read_recording(path: Path) -> WireRecording | DriveRecording:
-    """Return the recording in a CSV file, of whichever kind it is. A row that is an exact copy of another counts once.
+    """Return the recording of either kind from a CSV file. An exact copy of a row is ignored.
 
     Raises:
-        RecordingError: The file is neither, a row cannot be read, or the rows are not in the order of their times.
-        OSError: The file cannot be opened.
+        RecordingError: the file has neither format, a row cannot be read, or the rows are not in the order of their
+            times.
+        OSError: the file cannot be opened.
     """
     table = read_table(path)
     if table.has(COLUMNS):
@@ -103,13 +104,13 @@ def read_recording(path: Path) -> WireRecording | DriveRecording:
         return DriveRecording(*map(np.array, columns))
     columns_there = shortened(", ".join(table.names)) or "(none)"
     raise RecordingError(
-        f"{path}: has the columns {columns_there}; needed are {', '.join(COLUMNS)} "
+        f"{path}: has the columns {columns_there}; required are {', '.join(COLUMNS)} "
         "(over the wire), or time_s, duty and position_deg or encoder_deg (from a drive)"
     )
 
 
 def _in_order(table: Table) -> Table:
-    """Return the table without the copies of rows; refuse rows that are not in the order of their times."""
+    """Return the table without repeated rows; refuse rows that are not in the order of their times."""
     distinct: dict[tuple[str, ...], Row] = {}
     for row in table.rows:
         distinct.setdefault(tuple(row.cells.values()), row)
@@ -127,7 +128,7 @@ def _in_order(table: Table) -> Table:
 
 
 def _wire(table: Table) -> WireRecording:
-    """Return the rows as a recording whose times begin within the first second: a clock may count from anywhere."""
+    """Return the rows as a recording whose times start within the first second: a clock may have any origin."""
     begin_s = floor(table.number(table.rows[0], "time_s", table.rows[0].cells["time_s"])) if table.rows else 0
     commands, times, positions, replies = [], [], [], []
     for row in table.rows:

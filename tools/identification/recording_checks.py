@@ -1,4 +1,4 @@
-"""Whether a recording can be used: each test says in one line what is wrong, where, and what is needed."""
+"""Check whether a recording can be used. Each message is one line with the problem, its place, and the requirement."""
 
 import numpy as np
 
@@ -16,21 +16,21 @@ _LEAST_TRAVEL_DEG = 5.0
 _STALL_S = 1.0
 _OBEYED_DEG = 0.3
 _STRAY_DEG = 0.6
-"""How far a table may be from where one with the assumed constants would be. Without a fault, it is at most 0.25."""
+"""Maximum deviation of a table from one with the assumed constants. Without a fault, it is at most 0.25."""
 _AS_FAR = (0.9, 1.1)
-"""Shares of the predicted travel that do not look like wrong units."""
+"""Shares of the predicted travel that do not indicate wrong units."""
 _UNSENT_S, _AT_REST_DEG = 0.3, 0.2
-"""For how long, and within which range, the prediction rests when the table moves without a command."""
+"""Time and range in which the prediction rests when the table moves without a command."""
 _MOST_LATE = 0.3
 _SHORTEST_REPLY = len("OK\r")
 _OVERLAP_S = 1e-3
 
 
 def check_recording(config: TableConfig, recording: WireRecording | DriveRecording) -> None:
-    """Refuse a recording that cannot tell the table's constants.
+    """Refuse a recording that does not identify the table's constants.
 
     Raises:
-        RecordingError: It is too short, has gaps, clock steps, a stall or the wrong units, or moves too little.
+        RecordingError: it is too short, has gaps, clock steps, a stall or the wrong units, or moves too little.
     """
     _check_times(recording.time_s)
     _check_speeds(config, recording.time_s, recording.position_deg)
@@ -45,7 +45,7 @@ def check_line(config: TableConfig, recording: WireRecording) -> None:
     """Refuse a recording in progress if the line or the recording computer delays too much.
 
     Raises:
-        RecordingError: The replies do not determine the table's ticks, or too many are late.
+        RecordingError: the replies do not determine the table's ticks, or too many are late.
     """
     at = timing(config, recording)
     if at.fault:
@@ -61,11 +61,11 @@ def check_line(config: TableConfig, recording: WireRecording) -> None:
 def _check_times(time_s: Array) -> None:
     duration_s = float(time_s[-1] - time_s[0]) if len(time_s) else 0.0
     if duration_s > LONGEST_DURATION_S:
-        raise RecordingError(f"the recording lasts {duration_s:.0f} s; are its times in seconds?")
+        raise RecordingError(f"the recording lasts {duration_s:.0f} s; check that its times are in seconds")
     if duration_s < LEAST_DURATION_S or len(time_s) < LEAST_READINGS:
         raise RecordingError(
             f"the recording has {len(time_s)} readings in {duration_s:.1f} s; "
-            f"needed are {LEAST_READINGS} in {LEAST_DURATION_S:g} s"
+            f"required are {LEAST_READINGS} in {LEAST_DURATION_S:g} s"
         )
     steps = np.diff(time_s)
     if steps.min() < 0.0:
@@ -74,12 +74,14 @@ def _check_times(time_s: Array) -> None:
 
 
 def _check_span(recording: WireRecording) -> None:
-    """Refuse commands far from the readings: the simulation would run up to them."""
+    """Refuse commands far from the readings, because the simulation would run up to them."""
     times = [sent.time_s for sent in recording.commands]
     for time_s in (min(times, default=0.0), max(times, default=0.0)):
         away_s = max(recording.time_s[0] - time_s, time_s - recording.time_s[-1])
         if times and away_s > LONGEST_DURATION_S:
-            raise RecordingError(f"a command at {time_s:.6g} s is {away_s:.3g} s away from the readings: a wrong time?")
+            raise RecordingError(
+                f"a command at {time_s:.6g} s is {away_s:.3g} s away from the readings; check its time"
+            )
 
 
 def _check_gaps(time_s: Array) -> None:
@@ -93,12 +95,12 @@ def _check_gaps(time_s: Array) -> None:
 
 
 def _check_speeds(config: TableConfig, time_s: Array, position_deg: Array) -> None:
-    """Find a step of the clock, or of the position, by a speed that no table of this kind has."""
+    """Find a step of the clock, or of the position, by a speed that no such table has."""
     travel_deg = float(np.ptp(position_deg))
     if travel_deg < _LEAST_TRAVEL_DEG:
         raise RecordingError(
-            f"the table moves over {travel_deg:.3g} deg only; needed are {_LEAST_TRAVEL_DEG:g} "
-            "(does it turn, and are the positions in degrees?)"
+            f"the table moves over {travel_deg:.3g} deg only; required are {_LEAST_TRAVEL_DEG:g} "
+            "(check that it turns, and that the positions are in degrees)"
         )
     most_deg_s = 2.0 * config.limits.speed_deg_s
     reach_s = 0.1
@@ -116,7 +118,7 @@ def _check_speeds(config: TableConfig, time_s: Array, position_deg: Array) -> No
 def _check_against_commands(config: TableConfig, recording: WireRecording) -> None:
     if not any(sent.verb in "PR" for sent in recording.commands):
         raise RecordingError(
-            "the recording has no P or R command; the duty follows from the commands, so they are needed"
+            "the recording has no P or R command; the duty follows from the commands, so they are required"
         )
     at = timing(config, recording)
     if at.fault:
@@ -154,7 +156,7 @@ def _check_dialogue(config: TableConfig, recording: WireRecording) -> None:
 
 
 _Fault = tuple[float, str]
-"""When it began, and what it is."""
+"""The start of a deviation, and its kind."""
 
 
 def _stall(time_s: Array, seen_deg: Array, predicted_deg: Array) -> _Fault | None:
@@ -167,7 +169,10 @@ def _stall(time_s: Array, seen_deg: Array, predicted_deg: Array) -> _Fault | Non
     if not stalled.any():
         return None
     at = float(time_s[np.argmax(stalled)])
-    return at - _STALL_S, f"the table stands still for {_STALL_S:g} s before {at:.2f} s though it was sent: a stall"
+    return (
+        at - _STALL_S,
+        f"the table stands still for {_STALL_S:g} s before {at:.2f} s although it had a command: a stall",
+    )
 
 
 def _stray(time_s: Array, seen_deg: Array, predicted_deg: Array) -> _Fault | None:
@@ -179,26 +184,26 @@ def _stray(time_s: Array, seen_deg: Array, predicted_deg: Array) -> _Fault | Non
     ratio = float(np.ptp(seen_deg) / max(np.ptp(predicted_deg), 1e-9))
     if np.ptp(predicted_deg[begin : first + 1]) < _AT_REST_DEG:
         reason = (
-            "it moves though no command sends it: a P or R command is missing, the clock was set, readings are mixed "
+            "it moves without a command: a P or R command is missing, the clock was set, readings are mixed "
             "up, or the table was turned by hand"
         )
     elif _AS_FAR[0] < ratio < _AS_FAR[1]:
         reason = (
             f"it is up to {np.abs(seen_deg - predicted_deg).max():.2g} deg away: a missing or changed command, a step "
-            "of the clock, mixed-up rows, a sign, or motion too fast for the table (record with a lower --speed)"
+            "of the clock, mixed-up rows, a sign; or motion too fast for the table (record with a lower --speed)"
         )
     else:
         reason = (
             f"it travels {ratio:.3g} times as far: wrong units, a step of the clock, a missing command, "
             "or other gears and encoder than configured"
         )
-    return at, f"from {at:.2f} s on the table is not where its commands send it; {reason}"
+    return at, f"from {at:.2f} s on the table is not at the position of its commands; {reason}"
 
 
 def _check_duty(config: TableConfig, recording: DriveRecording) -> None:
     if np.abs(recording.duty).max() > 1.0:
         raise RecordingError(
-            f"the duty reaches {np.abs(recording.duty).max():.4g}; it must be within -1..1 (percent, or volts?)"
+            f"the duty reaches {np.abs(recording.duty).max():.4g}; it must be within -1..1 (not percent or volts)"
         )
     duty, position_deg = ticks_of(recording, config.control.tick_hz)
     driven = np.abs(duty) > config.protection.stall_duty
@@ -211,5 +216,5 @@ def _check_duty(config: TableConfig, recording: DriveRecording) -> None:
         raise RecordingError(f"the motor is driven hard but stands still at {at_s:.2f} s: a stall")
     if np.abs(np.diff(np.sign(duty[duty != 0.0]))).sum() == 0.0:
         raise RecordingError(
-            "the duty never changes its sign; without reversals neither friction nor backlash can be told"
+            "the duty never changes its sign; without reversals neither friction nor backlash is identifiable"
         )

@@ -1,7 +1,7 @@
-"""The grid on which replies come: a table that answers at its ticks shows them to the recorder.
+"""The grid of the replies: a table that replies at its ticks makes them visible to the recorder.
 
-The phase of the replies within a tick is common to all, but for the rates of the two clocks. Where it is not, something
-between the table and the recorder delays replies at random. Where all replies come on a coarser grid, something gathers
+The phase of the replies within a tick is constant, except for the difference of the two clocks. If it is not, something
+between the table and the recorder delays replies randomly. If all replies are on a coarser grid, something collects
 them. In both cases the replies do not determine the ticks.
 """
 
@@ -12,31 +12,31 @@ import numpy as np
 from tools.emulated import Array
 
 _COMMON = 0.5
-"""Least share of the phase that is common to the replies of a grid: 0..1."""
+"""Minimum constant share of the phase of the replies of a grid: 0..1."""
 _LOCALLY_COMMON = 0.3
-"""The same within a window; a window with less (late replies, or few) takes its phase from its neighbors."""
+"""The same within a window; a window with less (late replies, or few) uses the phase of its neighbors."""
 
 _BIN_PERIODS, _WINDOW_TICKS = 100.0, 1000.0
 _LEAST_IN_WINDOW = 20
 _MOST_RATE = 2.5e-3
-"""The greatest difference between the rates of the clocks."""
+"""The maximum difference between the rates of the clocks."""
 _MOST_STEP, _APART = 0.25, 2
-"""The greatest change of the phase between so many windows, in ticks: one window may see both sides of a jump."""
+"""The maximum change of the phase over this number of windows, in ticks: one window may contain a jump."""
 _STEADY = 0.8
-"""Least share of the windows in which the phase is common."""
+"""Minimum share of the windows with a constant phase."""
 _COARSER = range(2, 65)
 
 
 class Grid(NamedTuple):
-    """The mapping from the recorder's clock to the table's ticks, and what is wrong with it."""
+    """The mapping from the recorder's clock to the table's ticks, and its faults."""
 
-    rate: float = 0.0  # by how much the recorder's clock runs faster than the table's
+    rate: float = 0.0  # relative rate difference of the recorder's clock to the table's
     centers: Array = np.zeros(1)  # (windows,) times on the recorder's clock, in nominal ticks
     phases: Array = np.zeros(1)  # (windows,) in ticks
     fault: str = ""  # one sentence
 
     def ticks(self, times: Array) -> Array:
-        """Return times on the recorder's clock (in nominal ticks) in the table's ticks; replies come at integers."""
+        """Convert times on the recorder's clock (in nominal ticks) to the table's ticks; replies are at integers."""
         result: Array = times * (1.0 - self.rate) - np.interp(times, self.centers, self.phases)
         return result
 
@@ -45,20 +45,20 @@ def reply_grid(arrived: Array, sent: Array) -> Grid:
     """Return the grid of replies.
 
     Args:
-        arrived: (replies,) when the replies were complete at the recorder, on its clock, in nominal ticks.
-        sent: (replies,) the same less the time that each reply took on the line.
+        arrived: (replies,) arrival times of the complete replies at the recorder, on its clock, in nominal ticks.
+        sent: (replies,) the same minus the transmission time of each reply.
     """
     for period in reversed(_COARSER):
         if max(_strength(times / period)[0] for times in (arrived, sent)) > _COMMON:
             return Grid(
-                fault=f"the replies come on a grid of {period} ticks of the table, too coarse to know the times: "
+                fault=f"the replies come on a grid of {period} ticks of the table, too coarse for exact times: "
                 "something gathers bytes (the latency timer of a USB adapter?), the times are rounded, "
                 "or control.tick_hz differs"
             )
     strength, rate = _strength(sent)
     if strength <= _LOCALLY_COMMON:
         return Grid(
-            fault="the replies do not come at the table's ticks, so the times are not known: something on the line "
+            fault="the replies do not come at the table's ticks, so the exact times are unknown: something on the line "
             "gathers bytes (the latency timer of a USB adapter?), the recorder's clock runs unevenly, "
             "or control.tick_hz differs"
         )
@@ -66,7 +66,7 @@ def reply_grid(arrived: Array, sent: Array) -> Grid:
 
 
 def _strength(times: Array) -> tuple[float, float]:
-    """Return the share of the phase that is common, and the difference of the clocks' rates; times in grid periods."""
+    """Return the constant share of the phase, and the difference of the clocks' rates; times in grid periods."""
     bins = np.floor(times / _BIN_PERIODS).astype(np.int64)
     bins -= bins.min()
     turned = np.exp(2j * np.pi * times)
@@ -79,7 +79,7 @@ def _strength(times: Array) -> tuple[float, float]:
 
 
 def _tracked(sent: Array, rate: float) -> Grid:
-    """Follow the phase from window to window: clocks drift, and the phase of a clock that is set jumps."""
+    """Follow the phase from window to window: clocks drift, and setting a clock makes the phase jump."""
     windows = np.floor((sent - sent.min()) / _WINDOW_TICKS).astype(np.int64)
     turned = np.exp(2j * np.pi * sent * (1.0 - rate))
     common = [
@@ -89,7 +89,7 @@ def _tracked(sent: Array, rate: float) -> Grid:
     ]
     strong = [(center, phasor) for center, phasor in common if abs(phasor) > _LOCALLY_COMMON]
     if len(strong) < max(1.0, _STEADY * len(common)):
-        return Grid(fault="the recorder's clock runs unevenly: the replies keep no phase with the table's ticks")
+        return Grid(fault="the recorder's clock runs unevenly: the replies have no constant phase")
     centers = np.array([center for center, _ in strong])
     phases = np.unwrap(np.angle([phasor for _, phasor in strong])) / (2.0 * np.pi)
     steps = np.abs(phases[_APART:] - phases[:-_APART])

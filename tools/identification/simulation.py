@@ -1,7 +1,7 @@
-"""What a table with given constants would answer in the place of the recorded one.
+"""Simulate a table with given constants instead of the recorded one.
 
-Over the wire the duty is not seen; but it follows from the commands, so the whole emulator runs, controller included. A
-drive's duty is known, so there the plant runs alone.
+In a recording over the wire the duty is not visible. But it follows from the commands, so the whole emulator runs,
+including the controller. A drive's duty is recorded, so then only the plant runs.
 """
 
 from functools import cache
@@ -27,22 +27,25 @@ _REFERENCE_SPEED = COLUMNS.index("reference_speed")
 
 
 class Standstill(NamedTuple):
-    """How a table stands at first. A number beyond its range is folded back into it: a search needs no bounds."""
+    """The initial state of a table.
 
-    encoder_phase: float = 0.5  # how far the shaft is between two counts, 0..1
-    gap_share: float = 0.0  # how far the teeth are from mid-gap towards a flank, -1..1
+    A number beyond its range is folded back into it, so that a search needs no bounds.
+    """
+
+    encoder_phase: float = 0.5  # position of the shaft between two counts, 0..1
+    gap_share: float = 0.0  # position of the teeth from mid-gap to a flank, -1..1
 
 
 MIDDLE = Standstill()
 
 
 def commanded_motions(config: TableConfig, recording: WireRecording, ticks: Array) -> NDArray[np.int64]:
-    """Return the motions of a recording as `emulator.table.batch` takes them, from the position of the first reading.
+    """Return the motions of a recording for `emulator.table.batch`, from the position of the first reading.
 
     Args:
-        config: The table.
-        recording: What was commanded.
-        ticks: (commands,) at whose end the commands were carried out.
+        config: the table.
+        recording: the commands.
+        ticks: (commands,) at whose end the commands were executed.
     """
     speed, acceleration = config.power_on.speed_deg_s, config.power_on.acceleration_deg_s2
     start_deg = recording.position_deg[0]
@@ -61,7 +64,7 @@ def commanded_motions(config: TableConfig, recording: WireRecording, ticks: Arra
 def wire_positions_deg(
     config: TableConfig, motions: NDArray[np.int64], ticks: Array, start: Standstill = MIDDLE
 ) -> Array:
-    """Return where the encoder would be at given ticks, which may have fractions, from where it was at the start."""
+    """Return the encoder position at given ticks, which may have fractions, from its initial position."""
     angle = _samples(config, motions, ceil(ticks.max()) + 2, start)[:, _ANGLE]
     angle = np.concatenate([[0.0], angle])
     tick = np.clip(np.floor(ticks).astype(np.int64), 0, len(angle) - 2)
@@ -71,7 +74,7 @@ def wire_positions_deg(
 
 
 def from_rest(config: TableConfig, motions: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Tell which motions begin when the profile stands."""
+    """Return which motions start while the profile stands."""
     speed = _samples(config, motions, int(motions[-1, 0]) + 1, MIDDLE)[:, _REFERENCE_SPEED]
     before: NDArray[np.bool_] = np.concatenate([[0.0], speed])[motions[:, 0]] == 0.0
     return before
@@ -84,12 +87,12 @@ def _samples(config: TableConfig, motions: NDArray[np.int64], ticks: int, start:
 
 
 def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) -> Array:
-    """Return where the motor turns the table to, at the end of each tick.
+    """Return the table's position from the motor, at the end of each tick.
 
     Args:
-        config: The table.
+        config: the table.
         duty: (n,) as computed at the end of each tick.
-        delay_ticks: From there to when it is on the bridge, from 0; a fraction of a tick mixes two neighbors.
+        delay_ticks: delay until it is on the bridge, from 0; a fraction of a tick mixes two neighbors.
     """
     whole = int(delay_ticks)
     padded = np.concatenate([np.zeros(whole + 2), duty])[: len(duty) + 1]
@@ -103,7 +106,7 @@ def drive_positions_deg(config: TableConfig, duty: Array, delay_ticks: float) ->
 
 
 def ticks_of(recording: DriveRecording, tick_hz: int) -> tuple[Array, Array]:
-    """Return duty and position at every tick; what a trace leaves out has not changed."""
+    """Return duty and position at every tick; ticks that a trace omits have no change."""
     tick = np.round((recording.time_s - recording.time_s[0]) * tick_hz).astype(np.int64)
     row = np.searchsorted(tick, np.arange(tick[-1] + 1), side="right") - 1
     return recording.duty[row], recording.position_deg[row]

@@ -1,8 +1,8 @@
-"""When the lines of a recording were carried out, in the table's ticks.
+"""The execution times of the lines of a recording, in the table's ticks.
 
-A line cannot be carried out before it is complete, nor after its reply. The time between is what is doubtful of it: a
-tick or so, and more when the recording computer was busy. A table that answers at its ticks sends its replies on a
-grid. Where the replies come on one, it tells the very tick of each.
+A line is executed after its complete arrival and before its reply. The time between the two is the uncertainty: about a
+tick, and more if the recording computer was busy. A table that replies at its ticks sends its replies on a grid. If the
+replies are on a grid, it determines the exact tick of each.
 """
 
 from typing import NamedTuple
@@ -16,13 +16,13 @@ from tools.identification.recording import BITS_A_BYTE, WireRecording
 from tools.identification.reply_grid import reply_grid
 
 _DOUBTFUL_TICKS = 0.8
-"""How much later than most a reply may come."""
+"""Maximum delay of a reply relative to most others."""
 
 
 class Timing(NamedTuple):
-    """The ticks at whose end lines were carried out, and which of them are in doubt."""
+    """The ticks at whose end lines were executed, and which of them are uncertain."""
 
-    fault: str  # why the ticks are not known, in one sentence, or empty
+    fault: str  # why the ticks are unknown, in one sentence, or empty
     readings: Array  # (readings,)
     commands: Array  # (commands,)
     doubtful_readings: NDArray[np.bool_]
@@ -30,7 +30,7 @@ class Timing(NamedTuple):
 
 
 def timing(config: TableConfig, recording: WireRecording) -> Timing:
-    """Return when the lines of a recording were carried out; without the times of replies, as soon as they could be."""
+    """Return the execution times of the lines of a recording; without times of replies, the earliest possible ones."""
     tick_hz, count = config.control.tick_hz, len(recording.time_s)
     sent = tick_hz * np.concatenate([recording.time_s, [sent.time_s for sent in recording.commands]])
     soonest = np.ceil(sent - 1e-3)
@@ -48,7 +48,7 @@ def timing(config: TableConfig, recording: WireRecording) -> Timing:
 
 
 def _reply_ticks(config: TableConfig, recording: WireRecording) -> Array:
-    """Return how long the replies were on the line; the controller sends a byte at the end of a tick."""
+    """Return the transmission times of the replies; the controller sends a byte at the end of a tick."""
     baud, tick_hz = config.serial.baud, config.control.tick_hz
     decimals = round(-np.log10(recording.resolution_deg))
     lengths = [len(f"H {angle:.{decimals}f}\r") for angle in recording.position_deg]

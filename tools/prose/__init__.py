@@ -1,1 +1,1 @@
-"""The prose linter: plain technical English in docs and help texts."""
+"""The prose linter: plain technical English in docs, help texts, docstrings, comments and messages."""

@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 
 API: Mapping[str, tuple[str, Sequence[str]]] = {
-    "protocol": ("The client, the codec and the errors of the wire.", ("protocol",)),
-    "emulator": ("The table in process, its configuration and its faults.", ("emulator", "emulator.faults")),
+    "protocol": ("The client, the codec and the errors of the protocol.", ("protocol",)),
+    "emulator": ("The table in the same process, its configuration and its faults.", ("emulator", "emulator.faults")),
     "planner": ("From a scan to a verified run; see also [the planner from Python](../api.md).", ("planner",)),
     "tuning": ("Plant, loop and gains as LTI objects; see also [tuning](../tuning.md#in-python).", ("tools.tuning",)),
 }
-"""Each page: what it is about, and the packages whose public names it lists."""
+"""Each page: its subject, and the packages whose public names it lists."""
 
 
 def api_pages() -> dict[str, str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 def examples_page(folder: Path) -> str:
     """Return the Markdown of a page with each example: its first line as heading, its source, or a link to it."""
-    parts = ["# Examples", "Each example is run by the tests. It is a file of its own in `docs/examples/`."]
+    parts = ["# Examples", "Each example is run by the tests. It is a separate file in `docs/examples/`."]
     for number, file in enumerate(sorted(path for path in folder.iterdir() if path.suffix in {".py", ".ipynb"}), 1):
         if file.suffix == ".py":
             source = file.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""A key of a TOML file as its page shows it."""
+"""A key of a TOML file, as shown on its page."""
 
 import re
 from collections.abc import Iterable
@@ -10,7 +10,7 @@ from tools.reference.units import unit
 
 
 class Key(NamedTuple):
-    """A key: its name with its sections, what is allowed, its default (None: required), and notes."""
+    """A key: its name with its sections, its allowed values, its default (None: required), and notes."""
 
     name: str
     allowed: str
@@ -27,7 +27,7 @@ def key_page(title: str, introduction: str, keys: Iterable[Key]) -> str:
 
 
 def comments(toml: str) -> dict[str, str]:
-    """Return the comment behind each key of a TOML file, by the key's name with its section."""
+    """Return the comment after each key of a TOML file, by the key's name with its section."""
     section, found = "", {}
     for line in toml.splitlines():
         if header := re.match(r"\[([\w.]+)\]", line):

@@ -8,7 +8,7 @@ from tools.reference.table_keys import table_page
 
 
 def generated_pages() -> dict[str, str]:
-    """Return the Markdown of each generated page, by its place in the docs."""
+    """Return the Markdown of each generated page, by its path in the docs."""
     keys = {"keys-table.md": table_page(), "keys-profile.md": profile_page(), **planner_pages(), **api_pages()}
     commands = {f"commands/{name}": text for name, text in command_pages().items()}
     return {f"reference/{name}": text for name, text in (keys | commands).items()}

@@ -1,4 +1,4 @@
-"""The keys of scan, arm and bodies files, from the planner's readers at work on files that have every key."""
+"""The keys of scan, arm and bodies files, from the planner's readers, applied to files that have every key."""
 
 import re
 from collections import Counter
@@ -25,7 +25,7 @@ from tools.reference.recorded_keys import recorded_keys
 
 _BOUNDS = "A bound that depends on another key is shown for that key's default."
 _SCAN = f"""A scan file describes cell, workpiece, path, value function, limits and weights. Files that it names
-are looked for in its own folder. Lengths are in mm and angles in degrees. A placement is
+are relative to its folder. Lengths are in mm and angles in degrees. A placement is
 `[x, y, z, yaw, pitch, roll]`, as Rz(yaw) Ry(pitch) Rz(roll). {_BOUNDS} `python -m planner new-scan` writes
 a scan file for a mesh."""
 _ARM = """The file that `cell.arm` names: the standard Denavit-Hartenberg table of a six-axis arm with a spherical
@@ -73,7 +73,7 @@ def scan_keys() -> list[Key]:
                 read_by[name] += 1
     for name, key in found.items():
         if key.default is None and read_by[name] < len(files):
-            found[name] = key._replace(default="")  # asked for in some scans only: the notes say in which
+            found[name] = key._replace(default="")  # required in some scans only: the notes state which
     sections = list(dict.fromkeys(name.rpartition(".")[0] for name in found))
     ordered = sorted(found.values(), key=lambda key: sections.index(key.name.rpartition(".")[0]))
     return _with_meanings(ordered)
@@ -124,10 +124,10 @@ def _with_meanings(keys: Iterable[Key]) -> list[Key]:
 
 
 def meaning(name: str) -> str:
-    """Return what a key means: from the docstring of the class that holds it, or from `_MEANINGS`.
+    """Return the meaning of a key: from the docstring of its class, or from `_MEANINGS`.
 
     Raises:
-        KeyError: Neither has it.
+        KeyError: neither has it.
     """
     last = name.rpartition(".")[2]
     text = _MEANINGS.get(name) or _MEANINGS.get(last) or _attributes()[last]
@@ -135,7 +135,7 @@ def meaning(name: str) -> str:
 
 
 def _attributes() -> Mapping[str, str]:
-    """Return the `Attributes:` of the classes that hold a file's values, each on one line."""
+    """Return the `Attributes:` of the classes for a file's values, each on one line."""
     found: dict[str, str] = {}
     for kind in (StripLayout, ValueFunction, Probe, Arm):
         section = cleandoc(kind.__doc__ or "").partition("Attributes:\n")[2].partition("\n\n")[0]
@@ -162,9 +162,9 @@ _MEANINGS = {
     "workpiece_on_table": f"the workpiece on the table, at table angle 0; default: {_xyz(_CELL.T_TW)}",
     "probe_on_flange": "the probe on the arm's flange: the laser's exit, the beam along z; "
     f"default: {_xyz(_CELL.T_FS)}",
-    "cell.table.radius_mm": "radius of the table's disc; no workpiece may reach beyond it",
+    "cell.table.radius_mm": "radius of the table's disc; no workpiece may extend beyond it",
     "thickness_mm": "thickness of the disc",
-    "plinth_radius_mm": "radius of the plinth under the disc",
+    "plinth_radius_mm": "radius of the base under the disc",
     "class": "class of the workpiece; required without a mesh; with a mesh, the dimensions are measured",
     "mesh": "an STL, PLY or OBJ file with a closed surface, in place of dimensions",
     "unit": "unit of length in the mesh file (default: mm; a mesh that is too small or too large for it is refused)",
@@ -188,7 +188,7 @@ _MEANINGS = {
     "start_mm": "one end of the capsule's segment",
     "end_mm": "the other end",
     "radius_mm": "radius of the capsule",
-    "gap_mm": "how far before the surface the checked beam ends",
+    "gap_mm": "distance from the end of the checked beam to the surface",
     **{name: f"whether the factor {name} of the value function counts" for name in FACTORS},
 }
-"""What no docstring states, by full name or by the last part of it."""
+"""Meanings that no docstring states, by full name or by the last part of it."""

@@ -1,6 +1,6 @@
 """The keys of a conformance profile, from the code that reads them.
 
-What a value may be is taken from the refusals of values that are too small and too large.
+The allowed values are taken from the error messages for values that are too small and too large.
 """
 
 import json
@@ -11,7 +11,7 @@ from typing import Any
 from protocol.conformance.profile.profile import DEFAULT_FILE, ProfileError, load_profile, profile_from
 from tools.reference.keys import Key, comments, key_page
 
-_INTRODUCTION = """A file for `python -m protocol.conformance --profile`: what is known of the table under test. It
+_INTRODUCTION = """A file for `python -m protocol.conformance --profile`: the properties of the table under test. It
 needs only the keys that differ from the default profile, which is that of the default table. A bound that depends on
 another key is shown for that key's default."""
 _WAIVE = Key("waive.CLAUSE", "a text", "", "why the table does not keep this clause; only clauses of level `should`")
@@ -40,7 +40,7 @@ def _keys(profile: Mapping[str, Any], notes: Mapping[str, str]) -> Iterator[Key]
 
 
 def _allowed(profile: Mapping[str, Any], section: str, key: str) -> str:
-    """Return what the refusals of the key say, each once."""
+    """Return the content of the error messages for the key, each once."""
     said = []
     for probe in _PROBES:
         try:

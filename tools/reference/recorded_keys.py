@@ -1,4 +1,4 @@
-"""Which keys readers ask of a TOML file, with what they allow: the readers run, and are recorded."""
+"""Record which keys the planner's readers request from a TOML file, with the allowed values."""
 
 import inspect
 import json
@@ -41,7 +41,7 @@ def _recording(reader: Callable[..., Any], found: dict[tuple[Path | str, str], K
 
 
 def _allowed(reader: Callable[..., Any], key: str, arguments: tuple[object, ...], options: dict[str, object]) -> str:
-    """Return what the reader's own refusal says; no key may be a table."""
+    """Return the content of the reader's own error message; no key may be a table."""
     try:
         reader(TomlTable(Path("probe"), {key: {}}), key, *arguments, **options)
     except DataFileError as error:
@@ -52,7 +52,7 @@ def _allowed(reader: Callable[..., Any], key: str, arguments: tuple[object, ...]
 def _default(reader: str, bound: dict[str, object]) -> str | None:
     default = bound.get("default")
     if reader == "texts":
-        return "[]"  # such a list may always be left out
+        return "[]"  # such a list may always be omitted
     if isinstance(default, float):
         return f"{default:g}"
     return None if default is None else json.dumps(default).strip('"')

@@ -1,15 +1,15 @@
-"""Links of the repository's pages, which work on a folder of files, as the site needs them."""
+"""Convert links of the repository's pages, which are for a folder of files, to links of the site."""
 
 import re
 from collections.abc import Callable, Mapping
 
 
 def without_docs_folder(markdown: str, pages: Mapping[str, str]) -> str:
-    """Return a page that stands beside docs/ as if it stood in it.
+    """Return a page beside docs/ with its links as if it were inside docs/.
 
     Args:
-        markdown: The page.
-        pages: The places in the site of the pages beside docs/, by their file names.
+        markdown: the page.
+        pages: the paths in the site of the pages beside docs/, by their file names.
     """
     return _links(markdown, lambda link: link.removeprefix("docs/"), pages)
 

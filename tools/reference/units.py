@@ -1,4 +1,4 @@
-"""The unit that the end of a key's name states."""
+"""The unit at the end of a key's name."""
 
 _UNITS = {
     "duty_s_deg": "s/deg",
@@ -32,7 +32,7 @@ _UNITS = {
     "V": "V",
     "s": "s",
 }
-"""Each ending, the longer of two before the shorter one."""
+"""Each suffix; the longer one of two comes first."""
 
 
 def unit(key: str) -> str:

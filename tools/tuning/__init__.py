@@ -1,10 +1,10 @@
 """Gain tuning: the speed loop as python-control systems, gain design within bounds, and checks on the emulator.
 
-The names below are the public interface; docs/tuning.md, "In Python", shows their use.
+The names below are the public interface; docs/tuning.md, "In Python", shows how to use them.
 """
 
 from emulator.config.table_config import GainsConfig
-from tools.tuning.bounds import Limits
+from tools.bounds import Limits
 from tools.tuning.check import Check, Curve, Figure
 from tools.tuning.checks import EmulatorChecks, check_on_emulator
 from tools.tuning.gain_files import gains_config

@@ -1,4 +1,4 @@
-"""A check on the emulator: what a run shows, beside what the linear model predicts, and the motions that all share."""
+"""A check on the emulator: the results of a run, the predictions of the linear model, and the common motions."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ _LEAST_RAMP_S = 0.1
 
 
 class Curve(NamedTuple):
-    """An answer in time: of the emulator, and where the linear model has one, of that."""
+    """A response over time: of the emulator and, if it has one, of the linear model."""
 
     time_s: Array
     emulator: Array
@@ -18,7 +18,7 @@ class Curve(NamedTuple):
 
 
 class Figure(NamedTuple):
-    """One figure of merit, the less the better. The key names it in programs, the title in reports."""
+    """One figure of merit; smaller is better. The key names it in programs, the title in reports."""
 
     key: str
     title: str
@@ -28,7 +28,7 @@ class Figure(NamedTuple):
 
 
 class Check(NamedTuple):
-    """A run and what it shows. The key names it in programs, the title in reports."""
+    """A run and its results. The key names it in programs, the title in reports."""
 
     key: str
     title: str
@@ -38,12 +38,12 @@ class Check(NamedTuple):
 
 
 def greatest_ramp(config: TableConfig) -> tuple[float, float, float]:
-    """Return speed, acceleration and duration of a ramp that lasts long enough to be seen."""
+    """Return speed, acceleration and duration of a ramp that is long enough to be visible."""
     speed = _RAMP_TO * config.limits.speed_deg_s
     acceleration = min(config.limits.acceleration_deg_s2, speed / _LEAST_RAMP_S)
     return speed, acceleration, speed / acceleration
 
 
 def far_deg(config: TableConfig) -> float:
-    """Return a target that no run of a check gets to."""
+    """Return a target that no run of a check reaches."""
     return _FAR_S * config.limits.speed_deg_s

@@ -1,4 +1,4 @@
-"""All checks of a table with its gain sets on the compiled emulator, and why some differ from the linear model."""
+"""All checks of a table with its gain sets on the compiled emulator, and the differences from the linear model."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,7 +13,7 @@ from tools.tuning.noise_check import noise
 from tools.tuning.nonlinear_checks import creep, reversal, small_moves
 
 AGREES_SHARE = 0.2
-"""Beyond this share of what the model predicts, a difference is explained."""
+"""A difference above this share of the model's prediction is explained."""
 
 _CHECKS: tuple[Callable[[TableConfig, int], Check], ...] = (
     ramp,
@@ -34,23 +34,23 @@ class EmulatorChecks(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """A figure in which emulator and model differ, and what it is on the emulator without some of its effects."""
+    """A figure in which emulator and model differ, and its value on the emulator without some of its effects."""
 
     figure: Figure
     without: dict[str, float]
 
 
 def check_on_emulator(config: TableConfig, ramp: GainsConfig, hold: GainsConfig, seed: int = 0) -> EmulatorChecks:
-    """Run all checks of a table with own gain sets; takes seconds.
+    """Run all checks of a table with given gain sets; takes seconds.
 
     Args:
-        config: The table.
-        ramp: Gain set for ramps, in engineering units.
-        hold: Gain set for a constant speed.
-        seed: Decides where the shaft stands between two counts, and the teeth within the backlash.
+        config: the table.
+        ramp: gain set for ramps, in engineering units.
+        hold: gain set for a constant speed.
+        seed: determines the position of the shaft between two counts, and of the teeth within the backlash.
 
     Raises:
-        ConfigError: As `loop.registers`.
+        ConfigError: as `loop.registers`.
     """
     for gains in (ramp, hold):
         registers(config, gains)
@@ -66,12 +66,12 @@ def all_checks(config: TableConfig, seed: int) -> list[Check]:
 
 
 def differs(figure: Figure) -> bool:
-    """Return whether the emulator is not where the model predicts it."""
+    """Return whether the emulator differs from the model's prediction."""
     return figure.model is not None and abs(figure.emulator - figure.model) > AGREES_SHARE * abs(figure.model)
 
 
 def differences(config: TableConfig, seed: int, checks: list[Check]) -> tuple[Difference, ...]:
-    """Return the figures in which emulator and model differ, each as it is on tables that lack what the model lacks."""
+    """Return the figures in which emulator and model differ, each with its values without the omitted effects."""
     found = []
     for run, check in zip(_CHECKS, checks, strict=True):
         if not any(map(differs, check.figures)):

@@ -1,10 +1,10 @@
-"""Tables of a tuning's report that compare: bounds on the noise with each other, and the sets with textbook rules."""
+"""Comparison tables of a tuning report: bounds on the noise, and textbook rules."""
 
 from collections.abc import Mapping, Sequence
 
 from emulator.config.table_config import TableConfig
 from protocol.page import Cell, Marked, table
-from tools.tuning.bounds import Limits
+from tools.bounds import Limits
 from tools.tuning.gain_design import Design
 from tools.tuning.linear_model import duty_gains
 from tools.tuning.loop_figures import LoopFigures
@@ -24,7 +24,7 @@ _FIGURES = (
 
 
 def trade_table(trades: Sequence[Trade], limits: Limits) -> str:
-    """Return the table of what each bound on the noise gives."""
+    """Return the table of the results for each bound on the noise."""
     rows = [_trade_row(trade, limits) for trade in trades]
     head = ("--noise (% duty)", "lag on a ramp (ms)", "load peak (deg/s per Nm)", "creep ripple (deg/s)", "")
     return table(head, rows)

@@ -1,4 +1,4 @@
-"""The outcome of a tuning for programs: each figure under its key."""
+"""The results of a tuning for programs: each figure under its key."""
 
 import json
 from math import isfinite

@@ -1,6 +1,7 @@
-"""Frequency responses of many speed loops at once: plants, candidate gains and frequencies along the axes of an array.
+"""Frequency responses of many speed loops at once: plants, gains and frequencies along the axes of an array.
 
-All on one grid of the discrete Fourier transform, so that a closed loop's answer in time is one inverse transform away.
+All use one grid of the discrete Fourier transform, so that an inverse transform gives the response of a closed loop
+over time.
 """
 
 from typing import NamedTuple
@@ -17,11 +18,14 @@ Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
 
 GRID_SIZE = 1024
-"""Ticks of an answer in time; one bin of the grid is the tick rate over this."""
+"""Number of ticks of a response over time; one bin of the grid is the tick rate over this."""
 
 
 class PlantResponse(NamedTuple):
-    """From duty and load to true and measured speed; one tick of the PWM's buffer is in the duty's. Shape (..., n)."""
+    """From duty and load to true and measured speed.
+
+    The response to the duty includes the tick of the PWM's buffer. Shape (..., n).
+    """
 
     measured_by_duty: Complex
     speed_by_duty: Complex
@@ -30,7 +34,7 @@ class PlantResponse(NamedTuple):
 
 
 def grid_z(size: int = GRID_SIZE) -> Complex:
-    """Return e^(j omega T) of the grid without 0 Hz, where the integrator has no finite answer."""
+    """Return e^(j omega T) of the grid without 0 Hz, where the response of the integrator is infinite."""
     result: Complex = np.exp(2j * np.pi * np.arange(1, size // 2 + 1) / size)
     return result
 
@@ -44,14 +48,14 @@ def grid_hz(config: TableConfig, size: int = GRID_SIZE) -> Array:
 def plant_response(configs: list[TableConfig], teeth: Teeth, z: Complex) -> PlantResponse:
     """Return the responses of many plants at once; shape (plants, frequencies).
 
-    It is `linear_model.plant` written out, for a thousand plants: motor and load with a zero-order hold by one stacked
+    It is `linear_model.plant`, vectorized for a thousand plants: motor and load with a zero-order hold by one stacked
     matrix exponential, the window as a sum of delays.
     """
     control = configs[0].control
     held = _exponential(np.array([_held_system(config, teeth) for config in configs]) / control.tick_hz)
     motor, inputs = held[:, :2, :2], held[:, :2, 3:]
     states = _resolvent(motor, z) @ inputs[:, None]  # (plants, frequencies, states, inputs)
-    turned = held[:, None, 2:3, :2] @ states + held[:, None, 2:3, 3:]  # the angle made in a tick
+    turned = held[:, None, 2:3, :2] @ states + held[:, None, 2:3, 3:]  # the travel in a tick
     window = control.speed_window_ticks
     mean = (z[:, None] ** -np.arange(1, window + 1)).sum(axis=1) * control.tick_hz / window
     table_deg = np.degrees(1.0 / np.array([config.gears.ratio for config in configs]))[:, None]
@@ -60,7 +64,7 @@ def plant_response(configs: list[TableConfig], teeth: Teeth, z: Complex) -> Plan
 
 
 def _held_system(config: TableConfig, teeth: Teeth) -> Array:
-    """Return the motor's continuous system, bordered by its held inputs duty and load, which do not change."""
+    """Return the motor's continuous system, extended by its held inputs duty and load, which do not change."""
     a, b = motor_system(config, teeth)
     bordered = np.zeros((5, 5))
     bordered[:3, :3] = a
@@ -69,10 +73,10 @@ def _held_system(config: TableConfig, teeth: Teeth) -> Array:
 
 
 def _exponential(matrices: Array) -> Array:
-    """Return e to each of a stack of small matrices.
+    """Return the exponentials of a stack of small matrices.
 
-    Where other programs keep the processors busy, the threads of a BLAS wait for each other at each of them: that makes
-    seconds of a few hundredths.
+    If other programs use the processors, the threads of a BLAS wait for each other at each matrix: this turns some
+    hundredths of a second into seconds.
     """
     with threadpool_limits(1, "blas"):
         result: Array = expm(matrices)

@@ -1,8 +1,8 @@
-"""Gain design: the best gain set that the firmware can hold, within bounds.
+"""Gain design: the best gain set, in the firmware's resolution, within bounds.
 
 A search over a grid of all three gains that zooms in on the best point. Each candidate is rounded to the firmware's
-registers before it is judged, so the result is what will run. Among candidates that keep the bounds the objective
-decides, otherwise how little they break them; so when nothing keeps the bounds, the best that can be had comes out.
+registers before it is judged, so the result is valid for the firmware. Among candidates that satisfy the bounds the
+objective decides, otherwise the total excess. So if nothing satisfies the bounds, the result is the nearest candidate.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ import numpy as np
 from emulator.firmware.fixed_point import GAIN_BITS, INTEGRAL_GAIN_BITS
 from emulator.firmware.pid import Gains
 from emulator.int32 import INT32_MAX
-from tools.tuning.bounds import Bound, violation
+from tools.bounds import Bound, violation
 from tools.tuning.frequency_response import Array
 from tools.tuning.linear_model import Teeth, speed_quantum_deg_s, time_constant_s
 from tools.tuning.loop_figures import LoopFigures, Loops, joined, loop_figures
@@ -29,11 +29,11 @@ _FINE = (7, 7, 7)
 ZOOMS = 6
 _BINDING_SHARE = 0.02
 _BATCH = 1 << 20
-"""Candidates times frequencies that are judged at once, for the sake of the memory."""
+"""Maximum number of candidates times frequencies that are judged at once, because of the memory."""
 
 
 class Design(NamedTuple):
-    """A gain set with its figures and bounds: the outcome of a search, or given."""
+    """A gain set with its figures and bounds: the result of a search, or given."""
 
     gains: Gains
     figures: LoopFigures  # of this one gain set, arrays of shape (1,)
@@ -41,18 +41,18 @@ class Design(NamedTuple):
 
     @property
     def broken(self) -> tuple[Bound, ...]:
-        """The bounds that the gains break; a loop that is not stable breaks all."""
+        """The bounds that the gains violate; a loop that is not stable violates all."""
         if not self.figures.stable[0]:
             return self.bounds
-        return tuple(bound for bound in self.bounds if not bound.excess(self.figures)[0] <= 0.0)  # NaN keeps none
+        return tuple(bound for bound in self.bounds if not bound.excess(self.figures)[0] <= 0.0)  # NaN satisfies none
 
     def stated(self, bound: Bound) -> str:
-        """Return a bound with what these gains reach, in words."""
-        return f"{bound.title} {bound.shown(float(getattr(self.figures, bound.figure)[0]))} (asked is {bound.asked})"
+        """Return a bound with the value of these gains, as text."""
+        return f"{bound.title} {bound.shown(float(getattr(self.figures, bound.figure)[0]))} (required: {bound.asked})"
 
     @property
     def binding(self) -> tuple[Bound, ...]:
-        """The bounds that keep the gains from being better: those that are nearly reached."""
+        """The bounds that prevent better gains: those that are nearly reached."""
         return tuple(bound for bound in self.bounds if bound.excess(self.figures)[0] > -_BINDING_SHARE)
 
 
@@ -73,13 +73,13 @@ def scan(loops: Loops) -> Scan:
 
 
 def design(scanned: Scan, bounds: tuple[Bound, ...], objective: Objective, zooms: int = ZOOMS) -> Design:
-    """Return the gain set with the least `objective` within the bounds.
+    """Return the gain set with the minimum `objective` within the bounds.
 
     Args:
-        scanned: The coarse scan of the table's loops.
-        bounds: What the gain set must keep.
-        objective: What is to be least of a loop's figures, such as `LEAST_LAG` or `LEAST_LOAD_PEAK`.
-        zooms: How often the search zooms in; each time makes the steps three times as fine.
+        scanned: the coarse scan of the table's loops.
+        bounds: the bounds for the gain set.
+        objective: the figure of a loop to minimize, such as `LEAST_LAG` or `LEAST_LOAD_PEAK`.
+        zooms: number of zoom steps of the search; each makes the grid three times as fine.
     """
     loops, reach = scanned.loops, scanned.reach
     best = scanned.points[_best(scanned.figures, bounds, objective)]
@@ -117,8 +117,8 @@ def _best(figures: LoopFigures, bounds: tuple[Bound, ...], objective: Objective)
 def _search_box(loops: Loops) -> tuple[Array, Array]:
     """Return the corners of the search: the logarithms of K times the plant's gain and of Ti, and Td over the window.
 
-    The delay of the loop, about half the window and two ticks, limits the gains: a motor so slow that, free of its
-    load, it integrates over the delay bears a gain in proportion to its time constant.
+    The delay of the loop, about half of the window plus two ticks, limits the gains. A slow motor without load is an
+    integrator over the delay. Then it allows a gain in proportion to its time constant.
     """
     control = loops.config.control
     delay_s = (control.speed_window_ticks / 2 + 2) / control.tick_hz

@@ -15,7 +15,7 @@ _KEYS = frozenset(f"gains.{name}.{entry.name}" for name in ("ramp", "hold") for 
 
 
 def gains_config(config: TableConfig, gains: Gains) -> GainsConfig:
-    """Return register values as the configuration states a gain set; `fixed_gains` gives the same registers back."""
+    """Return register values as gains of the configuration; `fixed_gains` converts them back to the same registers."""
     proportional, integral, derivative = (float(gain) for gain in duty_gains(config, gains))
     tick_s = 1.0 / config.control.tick_hz
     if proportional == 0.0:
@@ -24,12 +24,12 @@ def gains_config(config: TableConfig, gains: Gains) -> GainsConfig:
 
 
 def gains_toml(config: TableConfig) -> str:
-    """Return a table and its gain sets as `load_config` reads them; all digits, so the registers come out the same."""
+    """Return a table and its gain sets for `load_config`, with all digits, so the registers stay the same."""
     return config_toml(config, _COMMENT, always=_KEYS)
 
 
 def gains_header(config: TableConfig, sets: dict[str, Gains]) -> str:
-    """Return the sets as a C header: integers, in PWM steps for a speed error of one count a window."""
+    """Return the sets as a C header: integers, in PWM steps for a speed error of one count per window."""
     control = config.control
     lines = [
         "/* Tuned gain sets of the rotary table, in the firmware's number format:",

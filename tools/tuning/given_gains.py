@@ -1,4 +1,4 @@
-"""Gain sets that a user gives in a TOML file, to be judged on a table."""
+"""Gain sets from a user's TOML file, to be judged on a table."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,15 +9,15 @@ from protocol.data_file import read_toml
 
 
 def given_gains(path: Path, config_path: Path | None) -> tuple[TableConfig, GainSetsConfig]:
-    """Return the table to judge gains on, with the gain sets of its own configuration, and the gain sets of a file.
+    """Return the table for the judgement, with the gain sets of its own configuration, and the gain sets of a file.
 
     Args:
-        path: The TOML file with `[gains.ramp]`, `[gains.hold]` or both. What it leaves out is as configured. Without
-            `config_path` its other sections are the table.
-        config_path: The table's TOML file.
+        path: the TOML file with `[gains.ramp]`, `[gains.hold]` or both. Missing gains are those of the configuration.
+            Without `config_path` its other sections are the table.
+        config_path: TOML file of the table.
 
     Raises:
-        ConfigError: A file is not valid, the first one has no gains, or the two describe different tables.
+        ConfigError: a file is not valid, the first one has no gains, or the two describe different tables.
     """
     given = load_config(path)
     sections: dict[str, Any] = read_toml(path).get("gains", {})
@@ -29,7 +29,7 @@ def given_gains(path: Path, config_path: Path | None) -> tuple[TableConfig, Gain
         replace(load_config(), gains=config.gains),
     ):
         raise ConfigError(
-            f"{path}: its table is not that of {config_path}; keep only its [gains] sections, or leave out --config"
+            f"{path}: its table is not that of {config_path}; keep only its [gains] sections, or omit --config"
         )
     sets = {
         name: replace(

@@ -15,17 +15,17 @@ from tools.tuning.loop import INTEGRAL_STATE, closed_loop, is_stable
 from tools.tuning.loop_figures import SETTLED_SHARE
 
 _STEP_FROM, _STEP_TO = 0.25, 0.375
-"""Speeds, as shares of the greatest one."""
+"""Speeds, as shares of the maximum one."""
 _LOAD_STEP = 0.0078
 """Share of the torque at standstill: 0.29 Nm for the default table."""
 _BEFORE_S = 0.1
-"""Time before a load step in which the speed is measured that the load then changes."""
+"""Time before a load step for measuring the speed without the load."""
 _STARTS = 64
-"""Places between two counts from which steps are made; their mean shows the answer without the counts' ripple."""
+"""Number of start positions of steps between two counts; the mean response has no ripple of the counts."""
 
 
 def ramp(config: TableConfig, seed: int) -> Check:
-    """Speed up at the greatest acceleration to half the greatest speed, and keep it."""
+    """Accelerate with the maximum acceleration to half of the maximum speed, and keep it."""
     speed, acceleration, ramp_s = greatest_ramp(config)
     start_s = 0.1
     answer = emulate(config, [Motion(start_s, far_deg(config), speed, acceleration)], start_s + ramp_s + 0.5, seed=seed)
@@ -61,7 +61,7 @@ def ramp(config: TableConfig, seed: int) -> Check:
 
 
 def step(config: TableConfig, seed: int) -> Check:
-    """Let the reference jump from one speed to another, under the constant-speed set."""
+    """Apply a step of the reference from one speed to another, with the constant-speed set."""
     low, high = (share * config.limits.speed_deg_s for share in (_STEP_FROM, _STEP_TO))
     height, at_s = high - low, _cruising_s(config)
     in_one_tick = 2.0 * height * config.control.tick_hz
@@ -89,13 +89,15 @@ def step(config: TableConfig, seed: int) -> Check:
 
 
 def load_step(config: TableConfig, seed: int) -> Check:
-    """Load the table while it turns at a constant speed."""
+    """Apply a load to the table while it turns at a constant speed."""
     speed, load_Nm, at_s = _STEP_FROM * config.limits.speed_deg_s, load_step_Nm(config), _cruising_s(config)
     motions = [Motion(0.1, far_deg(config), speed, greatest_ramp(config)[1])]
     time_s, speed_deg_s = _mean_speed(config, motions, at_s + 0.3, [Load(at_s, load_Nm)], seed)
     model = _after_step(config, time_s, at_s, 0.0, load_Nm)
     after = time_s > at_s
-    seen = speed_deg_s - speed_deg_s[~after & (time_s > at_s - _BEFORE_S)].mean()  # weak gains may still approach it
+    seen = (
+        speed_deg_s - speed_deg_s[~after & (time_s > at_s - _BEFORE_S)].mean()
+    )  # a loop with low gains may not have settled
     peaks = _pair(seen, model, lambda curve: float(-curve[after].min()))
     height = peaks[0] if peaks[1] is None else peaks[1]
     settling = _pair(seen, model, lambda curve: _settling_ms(time_s[after] - at_s, curve[after], height))
@@ -113,13 +115,13 @@ def load_step(config: TableConfig, seed: int) -> Check:
 
 
 def load_step_Nm(config: TableConfig) -> float:
-    """Return the load that is put on the table: a small share of what the motor can drive."""
+    """Return the load on the table: a small share of the motor's torque."""
     at_motor_Nm = config.motor.torque_constant_Nm_A * config.driver.supply_V / config.motor.resistance_ohm
     return float(f"{_LOAD_STEP * at_motor_Nm / load_ratio(config, Teeth.DRIVING):.2g}")
 
 
 def _cruising_s(config: TableConfig) -> float:
-    """Return when a table that was started at 0.1 s has long been at the lower speed of a step."""
+    """Return a time at which a table that was started at 0.1 s has settled at the lower speed of a step."""
     return 0.9 + _STEP_FROM * config.limits.speed_deg_s / greatest_ramp(config)[1]
 
 
@@ -134,7 +136,7 @@ def _mean_speed(
 def _after_step(
     config: TableConfig, time_s: Array, at_s: float, reference_deg_s: float, load_Nm: float
 ) -> Array | None:
-    """Return the linear answer of the speed to a step in the constant-speed set; none if the loop is not stable."""
+    """Return the linear response of the speed to a step in the constant-speed set; None if the loop is not stable."""
     after = (time_s > at_s).astype(float)
     loop = closed_loop(config, Teeth.DRIVING, fixed_gains(config, config.gains.hold))
     if not is_stable(loop):
@@ -146,9 +148,9 @@ def _after_step(
 
 
 def _ramp_then_hold(config: TableConfig, time_s: Array, reference_deg_s: Array, load_Nm: Array) -> Array | None:
-    """Return what `_linear` does, of a loop that changes without a bump to the constant-speed set after the ramp.
+    """Return the result of `_linear` for a loop that changes without a bump to the constant-speed set after the ramp.
 
-    There is no answer if one of the loops is not stable.
+    There is no response if one of the loops is not stable.
     """
     ramp, hold = (fixed_gains(config, gains) for gains in (config.gains.ramp, config.gains.hold))
     loops = [closed_loop(config, Teeth.DRIVING, gains) for gains in (ramp, hold)]
@@ -156,7 +158,7 @@ def _ramp_then_hold(config: TableConfig, time_s: Array, reference_deg_s: Array, 
         return None
     inputs = np.vstack([reference_deg_s, load_Nm, np.zeros_like(time_s)])
     first = control.forced_response(loops[0], time_s, inputs, return_x=True)
-    switch = int(np.flatnonzero(np.diff(reference_deg_s))[-1]) + 2  # the first tick at which the reference stays
+    switch = int(np.flatnonzero(np.diff(reference_deg_s))[-1]) + 2  # the first tick with a constant reference
     state, measured = first.states[:, switch].copy(), first.outputs[1]
     error, change = reference_deg_s[switch] - measured[switch], measured[switch] - measured[switch - 1]
     proportional, _, derivative = duty_gains(config, ramp) - duty_gains(config, hold)
@@ -178,11 +180,11 @@ def _means(seen: Array, predicted: Array | None, where: NDArray[np.bool_]) -> tu
 
 
 def _pair(seen: Array, predicted: Array | None, figure: Callable[[Array], float]) -> tuple[float, float | None]:
-    """Return a figure of the emulator and, where there is one, of the linear answer."""
+    """Return a figure of the emulator and, if there is one, of the linear response."""
     return figure(seen), None if predicted is None else figure(predicted)
 
 
 def _settling_ms(time_s: Array, deviation: Array, height: float) -> float:
-    """Return when the deviation last leaves a band of a tenth of the height."""
+    """Return the time at which the deviation last leaves a band of a tenth of the height."""
     outside = np.flatnonzero(np.abs(deviation) > SETTLED_SHARE * height)
     return float(1e3 * time_s[outside[-1]]) if len(outside) else 0.0

@@ -1,11 +1,11 @@
-"""The speed loop as a linear sampled system, from the same configuration that the emulator runs on.
+"""The speed loop as a linear sampled system, from the same configuration as the emulator.
 
-Between two control ticks the duty is held, so motor, gears and load are discretized with a zero-order hold. The
-loop's timing is the firmware's: the speed is the count's difference over a window of W ticks, and a new duty waits one
-tick in the PWM's buffer before it is on the bridge (`emulator.table.tick`).
+Between two control ticks the duty is held, so motor, gears and load are discretized with a zero-order hold. The timing
+is that of the firmware. The speed is the count's difference over a window of W ticks. A new duty waits one tick in the
+PWM's buffer before it is applied (`emulator.table.tick`).
 
-What is not linear is left out and stated elsewhere: dry friction acts as a constant load while the table turns, the
-quantization of speed and PWM as two noises (`quantization_noise`), and the backlash as the states of `Teeth`.
+Nonlinear effects are modeled elsewhere. Dry friction acts as a constant load while the table turns. The quantization of
+speed and PWM is two noises (`quantization_noise`), and the backlash is the states of `Teeth`.
 """
 
 from enum import StrEnum
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Teeth(StrEnum):
-    """State of the backlash, which decides what the motor turns (`emulator.plant.drive_train`)."""
+    """State of the backlash, which determines the inertia that the motor turns (`emulator.plant.drive_train`)."""
 
     DRIVING = "driving"
     """The teeth touch, and the motor drives the table."""
@@ -34,7 +34,7 @@ class Teeth(StrEnum):
 
 
 def load_ratio(config: TableConfig, teeth: Teeth) -> float:
-    """Return the torque at the motor for a torque at the table: the efficiency depends on who drives."""
+    """Return the torque at the motor for a torque at the table; the efficiency depends on the power flow."""
     gears = config.gears
     if teeth is Teeth.FREE:
         return 0.0
@@ -62,13 +62,16 @@ def held_motor(config: TableConfig, teeth: Teeth) -> control.StateSpace:
 
 
 def plant(config: TableConfig, teeth: Teeth) -> control.StateSpace:
-    """Return the sampled plant, as the controller sees it.
+    """Return the sampled plant, as seen by the controller.
 
     Inputs: `duty`, which the controller computes in this tick (1 is full; it acts a tick later), `load_Nm`, a torque at
-    the table against positive rotation, and `encoder_error_deg`, which is added to the position that is read. Outputs:
-    `speed_deg_s` of the motor, divided by the gear ratio, and `measured_deg_s`, the encoder's mean over the window.
-    States: current, speed, the angle made in each of the last W ticks, and the duty in the PWM's buffer. No state holds
-    the position itself, so the plant has no integrator.
+    the table against positive rotation, and `encoder_error_deg`, which is added to the measured position.
+
+    Outputs: `speed_deg_s` of the motor, divided by the gear ratio, and `measured_deg_s`, the encoder's mean over the
+    window.
+
+    States: current, speed, the travel in each of the last W ticks, and the duty in the PWM's buffer. No state is the
+    position itself, so the plant has no integrator.
     """
     teeth = Teeth(teeth)
     tick_s, window = 1.0 / config.control.tick_hz, config.control.speed_window_ticks
@@ -76,7 +79,7 @@ def plant(config: TableConfig, teeth: Teeth) -> control.StateSpace:
     size = 3 + window
     a, b = np.zeros((size, size)), np.zeros((size, 3))
     a[:3, :2], a[:3, -1] = held.A[:, :2], held.B[:, 0] * config.driver.supply_V
-    b[:3, 1] = held.B[:, 1] * load_ratio(config, teeth)  # the third row is the angle made in this tick
+    b[:3, 1] = held.B[:, 1] * load_ratio(config, teeth)  # the third row is the travel in this tick
     a[3:-1, 2:-2] = np.eye(window - 1)
     b[-1, 0] = 1.0
     # Of the reading's errors e(k) .. e(k-W+1) all but the first and the last cancel in the sum over the window.
@@ -99,10 +102,10 @@ def plant(config: TableConfig, teeth: Teeth) -> control.StateSpace:
 
 
 def duty_gains(config: TableConfig, gains: Gains | Array) -> Array:
-    """Return register values as gains in duty per deg/s: proportional, integral a tick, derivative a tick.
+    """Return register values as gains in duty per deg/s: proportional, integral per tick, derivative per tick.
 
     Args:
-        config: The table.
+        config: the table.
         gains: (..., 3) register values, or one `Gains`.
     """
     quantum_deg_s = speed_quantum_deg_s(config)
@@ -112,20 +115,20 @@ def duty_gains(config: TableConfig, gains: Gains | Array) -> Array:
 
 
 def speed_quantum_deg_s(config: TableConfig) -> float:
-    """Return the speed of one count a window."""
+    """Return the speed of one count per window."""
     return 1.0 / config.counts_per_deg * config.control.tick_hz / config.control.speed_window_ticks
 
 
 def quantization_noise(config: TableConfig) -> tuple[float, float]:
     """Return the standard deviations of the two quantizations: of a count in deg, of the PWM in duty.
 
-    Rounding to a step is taken as white noise, uniform over the step: step / sqrt(12).
+    Rounding to a step is modeled as white noise, uniform over the step: step / sqrt(12).
     """
     return 1.0 / config.counts_per_deg / sqrt(12.0), 1.0 / config.driver.duty_max / sqrt(12.0)
 
 
 def moving_friction_Nm(config: TableConfig) -> float:
-    """Return the dry friction of a table that is driven, as a torque at the table."""
+    """Return the dry friction of a driven table, as a torque at the table."""
     ratio = load_ratio(config, Teeth.DRIVING)
     return config.friction.coulomb_Nm / ratio + config.table.bearing_friction_Nm
 

@@ -1,10 +1,10 @@
-"""The speed loop as python-control systems: regulator, open loop and closed loop, for gains in engineering units.
+"""The speed loop as python-control systems: PID, open loop and closed loop, for gains in engineering units.
 
     u = K (e + integral(e) / Ti - Td d(measured)/dt),    e = reference - measured
 
-The controller computes `duty` from the measured speed of the same tick; the PWM's tick of delay is in
-`linear_model.plant`. All systems are discrete in time with the controller's tick, their signals carry their units in
-their names, and their gains are those that the firmware's registers hold.
+The controller computes `duty` from the measured speed of the same tick. The PWM's tick of delay is in
+`linear_model.plant`. All systems are discrete in time with the controller's tick. Their signals have their units in
+their names, and their gains are those in the firmware's registers.
 """
 
 from dataclasses import asdict
@@ -21,18 +21,18 @@ from protocol.toml_table import TomlTable
 from tools.tuning.linear_model import Teeth, duty_gains, held_motor, plant
 
 INTEGRAL_STATE = -2
-"""Index of the regulator's integral in the state of `closed_loop`."""
+"""Index of the PID's integral in the state of `closed_loop`."""
 
 
 def registers(config: TableConfig, gains: GainsConfig) -> Gains:
     """Return gains in engineering units as the firmware's integers; `gains_config` converts them back.
 
     Args:
-        config: The table; tick, window, encoder, gear ratio and PWM determine the registers' units.
+        config: the table; tick, window, encoder, gear ratio and PWM determine the registers' units.
         gains: K in duty per deg/s (1 is full duty), Ti and Td in seconds.
 
     Raises:
-        ConfigError: A gain is not finite, out of its range, or does not fit its register.
+        ConfigError: a gain is not finite, out of its range, or does not fit its register.
     """
     return fixed_gains(config, section(GainsConfig, TomlTable("gains", asdict(gains), error=ConfigError), {}))
 
@@ -41,11 +41,11 @@ def regulator(config: TableConfig, gains: GainsConfig | Gains) -> control.StateS
     """Return the PID: inputs `reference_deg_s` and `measured_deg_s`, output `duty`.
 
     Args:
-        config: The table.
-        gains: Engineering units, which are rounded to registers, or registers.
+        config: the table.
+        gains: engineering units, which are rounded to registers, or registers.
 
     Raises:
-        ConfigError: As `registers`.
+        ConfigError: as `registers`.
     """
     held = gains if isinstance(gains, Gains) else registers(config, gains)
     proportional, integral, derivative = duty_gains(config, held)
@@ -65,17 +65,17 @@ def regulator(config: TableConfig, gains: GainsConfig | Gains) -> control.StateS
 def open_loop(config: TableConfig, teeth: Teeth, gains: GainsConfig | Gains) -> control.TransferFunction:
     """Return L = C G for margins, Bode and Nyquist plots and the root locus; 1 + L = 0 at the closed loop's poles.
 
-    C is what the regulator does with the measured speed, derivative included, G the plant from duty to measured speed.
-    Input `error_deg_s`, output `measured_deg_s`. It is a transfer function, as `control.margin` and
-    `control.root_locus` compute with polynomials.
+    C is the response of the PID to the measured speed, including the derivative. G is the plant from duty to measured
+    speed. The input is `error_deg_s`, the output `measured_deg_s`. It is a transfer function, because `control.margin`
+    and `control.root_locus` compute with polynomials.
 
     Args:
-        config: The table.
-        teeth: State of the backlash.
-        gains: Engineering units, which are rounded to registers, or registers.
+        config: the table.
+        teeth: state of the backlash.
+        gains: engineering units, which are rounded to registers, or registers.
 
     Raises:
-        ConfigError: As `registers`.
+        ConfigError: as `registers`.
     """
     teeth = Teeth(teeth)
     held = gains if isinstance(gains, Gains) else registers(config, gains)
@@ -85,7 +85,7 @@ def open_loop(config: TableConfig, teeth: Teeth, gains: GainsConfig | Gains) -> 
     pid = proportional + integral * z / (z - 1.0) + derivative * (z - 1.0) / z
     motor = held_motor(config, teeth)
     turned = control.ss2tf(motor.A[:2, :2], motor.B[:2, :1], motor.A[2:, :2], motor.B[2:, :1], tick_s)
-    # Built of polynomials: a conversion of the whole state space loses all digits with a window of 64 ticks.
+    # Made from polynomials: a conversion of the whole state space loses all digits with a window of 64 ticks.
     mean = control.tf(np.ones(window), [window * tick_s, *np.zeros(window)], tick_s)
     table_deg_duty = degrees(config.driver.supply_V / config.gears.ratio)
     loop = pid / z * table_deg_duty * turned * mean
@@ -99,12 +99,12 @@ def closed_loop(config: TableConfig, teeth: Teeth, gains: GainsConfig | Gains) -
     in `linear_model.plant`.
 
     Args:
-        config: The table.
-        teeth: State of the backlash.
-        gains: Engineering units, which are rounded to registers, or registers.
+        config: the table.
+        teeth: state of the backlash.
+        gains: engineering units, which are rounded to registers, or registers.
 
     Raises:
-        ConfigError: As `registers`.
+        ConfigError: as `registers`.
     """
     return control.interconnect(
         [plant(config, teeth), regulator(config, gains)],

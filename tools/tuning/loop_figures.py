@@ -1,4 +1,4 @@
-"""What a gain set is judged by: figures of the linear loop, for many plants or many gain sets at once."""
+"""Figures of the linear loop for judging a gain set, for many plants or many gain sets at once."""
 
 from collections.abc import Sequence
 from typing import NamedTuple, Self
@@ -18,7 +18,7 @@ SETTLED_SHARE = 0.1
 class Loops(NamedTuple):
     """The plants of one or many tables in each state of the backlash, on one grid of frequencies."""
 
-    config: TableConfig  # whose controller they all have
+    config: TableConfig  # the table of their common controller
     z: Complex
     frequency_hz: Array
     plants: dict[Teeth, PlantResponse]
@@ -26,7 +26,7 @@ class Loops(NamedTuple):
 
     @classmethod
     def of(cls, configs: list[TableConfig], grid_size: int) -> Self:
-        """Return the loops of tables that differ in their plants alone."""
+        """Return the loops of tables that differ only in their plants."""
         z = grid_z(grid_size)
         return cls(
             configs[0],
@@ -38,20 +38,22 @@ class Loops(NamedTuple):
 
 
 class LoopFigures(NamedTuple):
-    """Figures of loops, each an array; the margins and the noise are the worst of all states of the backlash."""
+    """Figures of loops, each an array; the margins and the noise are the worst over all states of the backlash."""
 
     stable: NDArray[np.bool_]
     sensitivity_peak: Array
     gain_margin_db: Array
     phase_margin_deg: Array
     noise_duty: Array  # standard deviation of the duty from the rounding of the position, at the worst constant speed
-    noisy_count_tick: Array  # that speed, the part of a count a tick; so much less than a whole count is as noisy
+    noisy_count_tick: (
+        Array  # that speed, as a fraction of a count per tick; a whole count minus this fraction has the same noise
+    )
     ramp_noise_duty: Array  # the same standard deviation on a ramp
     bandwidth_hz: Array  # -3 dB of the speed over the reference, loaded
     overshoot: Array  # of the speed after a step of the reference, loaded; 0.1 is 10 %
     settling_s: Array  # from a step of the reference or the load until the speed stays within a tenth of it
     ramp_lag_s: Array  # speed error over acceleration on a ramp
-    load_peak_deg_s_Nm: Array  # speed lost at most after a step of the load
+    load_peak_deg_s_Nm: Array  # maximum loss of speed after a step of the load
 
 
 def loop_figures(loops: Loops, registers: Array) -> LoopFigures:
@@ -95,11 +97,11 @@ def loop_figures(loops: Loops, registers: Array) -> LoopFigures:
 
 
 def step_answer(response: Complex, at_rest: float) -> Array:
-    """Return the answer to a unit step of a stable system, by the inverse Fourier transform of its response.
+    """Return the response of a stable system to a unit step, by the inverse Fourier transform of its response.
 
     Args:
-        response: The response on `grid_z`; its answer to an impulse must be over within the grid's length.
-        at_rest: Its value at 0 Hz, which is what the answer comes to.
+        response: the response on `grid_z`; its impulse response must end within the grid's length.
+        at_rest: its value at 0 Hz, the final value of the step response.
     """
     whole = np.concatenate([np.full((*response.shape[:-1], 1), at_rest, dtype=complex), response], axis=-1)
     answer: Array = np.cumsum(np.fft.irfft(whole, axis=-1), axis=-1)
@@ -112,7 +114,7 @@ def joined(parts: Sequence[LoopFigures]) -> LoopFigures:
 
 
 def _bandwidth_hz(tracking: Complex, frequency_hz: Array) -> Array:
-    """Return where the size of the response, which is 1 at 0 Hz, first falls below -3 dB."""
+    """Return the frequency at which the absolute response, which is 1 at 0 Hz, first falls below -3 dB."""
     size = np.log(np.abs(np.concatenate([np.ones((*tracking.shape[:-1], 1)), tracking], axis=-1)) * np.sqrt(2.0))
     frequency_hz = np.concatenate([[0.0], frequency_hz])
     below = size < 0.0

@@ -1,4 +1,4 @@
-"""Robustness and performance of a speed loop, read from its frequency response.
+"""Robustness and performance of a speed loop, from its frequency response.
 
     L = C G              loop, C the regulator, G the plant with its delay
     S = 1 / (1 + L)      sensitivity; Ms its peak: 1/Ms is the least distance of L from -1
@@ -24,14 +24,14 @@ _QUARTIC = np.stack(  # Lagrange's polynomials of the points 0, 1, 2, 3, 4
 
 
 class Controller(NamedTuple):
-    """The regulator's responses: to the reference, and to the measured speed (the derivative acts on that alone)."""
+    """The PID's responses: to the reference, and to the measured speed (the derivative acts only on the latter)."""
 
     by_reference: Complex
     by_measured: Complex
 
 
 class Margins(NamedTuple):
-    """Robustness of a loop; where `stable` is false the others mean nothing."""
+    """Robustness of a loop; if `stable` is false, the others have no meaning."""
 
     stable: NDArray[np.bool_]
     sensitivity_peak: Array
@@ -41,7 +41,7 @@ class Margins(NamedTuple):
 
 
 def controller(gains: Array, z: Complex) -> Controller:
-    """Return the regulators' responses; gains (..., 3) in duty per deg/s as of `linear_model.duty_gains`."""
+    """Return the PID's responses; gains (..., 3) in duty per deg/s as of `linear_model.duty_gains`."""
     proportional, integral, derivative = (gains[..., [column]] for column in range(3))
     difference = 1.0 - 1.0 / z
     by_reference = proportional + integral / difference
@@ -49,9 +49,9 @@ def controller(gains: Array, z: Complex) -> Controller:
 
 
 def margins(loop: Complex, frequency_hz: Array) -> Margins:
-    """Return the margins of loops L of stable plants with an integrating regulator; shape (..., frequencies)."""
+    """Return the margins of loops L of stable plants with an integrating PID; shape (..., frequencies)."""
     distance = 1.0 + loop
-    # Nyquist: from -90 deg at 0 Hz, because of the integrator, 1 + L must turn by +90 deg and not about the origin.
+    # Nyquist: from -90 deg at 0 Hz, because of the integrator, 1 + L must turn by +90 deg and not around the origin.
     turned = np.angle(distance[..., 0]) + np.angle(distance[..., 1:] / distance[..., :-1]).sum(axis=-1)
     return Margins(
         np.abs(turned) < np.pi / 2,
@@ -62,7 +62,7 @@ def margins(loop: Complex, frequency_hz: Array) -> Margins:
 
 
 def _least_size(curve: Complex) -> Array:
-    """Return the least distance of a curve from the origin, on the quartic through the points about the nearest one."""
+    """Return the minimum distance of a curve from the origin, on the quartic near the nearest point."""
     nearest = np.abs(curve).argmin(axis=-1)
     first = np.clip(nearest - 2, 0, curve.shape[-1] - 5)
     points = np.take_along_axis(curve, first[..., None] + np.arange(5), axis=-1)
@@ -71,7 +71,7 @@ def _least_size(curve: Complex) -> Array:
 
 
 def _gain_margin_db(loop: Complex) -> Array:
-    """Where L crosses the negative real axis, its distance from the origin, linear between two frequencies."""
+    """The distance from the origin at which L crosses the negative real axis, linear between two frequencies."""
     a, b = loop[..., :-1], loop[..., 1:]
     share = _crossing(a.imag, b.imag)
     real = a.real + share * (b.real - a.real)
@@ -82,7 +82,7 @@ def _gain_margin_db(loop: Complex) -> Array:
 
 
 def _phase_margin(loop: Complex, frequency_hz: Array) -> tuple[Array, Array]:
-    """Return the least angle from -180 deg where |L| crosses 1, and the last such frequency."""
+    """Return the minimum angle from -180 deg where |L| crosses 1, and the last such frequency."""
     size = np.log(np.abs(loop))
     a, b = size[..., :-1], size[..., 1:]
     crosses = a * b < 0.0
@@ -96,13 +96,13 @@ def _phase_margin(loop: Complex, frequency_hz: Array) -> tuple[Array, Array]:
 
 
 def _crossing(a: Array, b: Array) -> Array:
-    """Return the share of the way from a to b at which the line through them is 0."""
+    """Return the share of the distance from a to b at which the line through them is 0."""
     change = b - a
     return np.clip(-a / np.where(change == 0.0, 1.0, change), 0.0, 1.0)
 
 
 def noise_power(control: Controller, plant: PlantResponse, window_s: float, window_ticks: int, z: Complex) -> Array:
-    """Return the squared response of the duty to an error of the position, which enters at both ends of the window."""
+    """Return the squared response of the duty to an error of the position, which acts at both ends of the window."""
     speed_by_position = (1.0 - z**-window_ticks) / window_s
     result: Array = (
         np.abs(control.by_measured / (1.0 + control.by_measured * plant.measured_by_duty) * speed_by_position) ** 2
@@ -113,10 +113,10 @@ def noise_power(control: Controller, plant: PlantResponse, window_s: float, wind
 def noise_duty(
     control: Controller, plant: PlantResponse, count_deg: float, window_s: float, window_ticks: int, z: Complex
 ) -> Array:
-    """Return the standard deviation of the duty that the rounding of the position to counts causes.
+    """Return the standard deviation of the duty caused by the rounding of the position to counts.
 
-    The errors are taken as white, as on a ramp, which passes all speeds. Parseval: the variance is the mean over all
-    frequencies of the squared response. All but the last of the grid stand for their mirror image too.
+    The errors are assumed to be white, as on a ramp, which passes all speeds. Parseval: the variance is the mean over
+    all frequencies of the squared response. All but the last of the grid also represent their mirror image.
     """
     power = noise_power(control, plant, window_s, window_ticks, z)
     variance = (power.sum(axis=-1) - 0.5 * power[..., -1]) / len(z)

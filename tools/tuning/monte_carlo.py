@@ -1,4 +1,4 @@
-"""Monte Carlo over the spread of the plant: how many of the tables that might be built meet the bounds."""
+"""Monte Carlo over the spread of the plant: the share of the possible tables that meet the bounds."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from emulator.config.table_config import TableConfig
-from tools.tuning.bounds import Bound
+from tools.bounds import Bound
 from tools.tuning.frequency_response import Array
 from tools.tuning.gain_design import Design
 from tools.tuning.loop_figures import LoopFigures, Loops, joined, loop_figures
 
 _BATCH = 1 << 17
-"""Plants times frequencies that are judged at once, for the sake of the memory."""
+"""Maximum number of plants times frequencies that are judged at once, because of the memory."""
 
 SPREAD_KEYS = (
     ("motor", "resistance_ohm"),
@@ -28,7 +28,7 @@ SPREAD_KEYS = (
 
 
 class Outcome(NamedTuple):
-    """The plants' figures under one gain set, and the shares of them that meet each bound and all."""
+    """The plants' figures with one gain set, and the shares of plants that meet each bound and all bounds."""
 
     figures: LoopFigures
     shares: tuple[tuple[Bound, float], ...]
@@ -37,7 +37,7 @@ class Outcome(NamedTuple):
 
 
 def spread_tables(config: TableConfig, count: int, spread: float, seed: int) -> list[TableConfig]:
-    """Return tables whose constants each lie uniformly within 1 - spread to 1 + spread of the configured value."""
+    """Return tables with constants uniformly distributed within 1 - spread to 1 + spread of the configured value."""
     factors = np.random.default_rng(seed).uniform(1.0 - spread, 1.0 + spread, (count, len(SPREAD_KEYS)))
     return [_scaled(config, row) for row in factors]
 
@@ -48,7 +48,7 @@ def monte_carlo(
     grid_size: int,
     progress: Callable[[float], None] = lambda _: None,
 ) -> list[Outcome]:
-    """Return how the tables do under each of the gain sets, on a grid of frequencies that all of them share."""
+    """Return the results of the tables with each of the gain sets, on a common grid of frequencies."""
     parts: list[list[LoopFigures]] = [[] for _ in designs]
     count = max(1, 2 * _BATCH // grid_size)
     for start in range(0, len(tables), count):

@@ -1,4 +1,4 @@
-"""The noise at the PWM on the emulator, beside the linear model: at the worst constant speed, and on a ramp."""
+"""The noise at the PWM on the emulator and in the linear model: at the worst constant speed, and on a ramp."""
 
 import numpy as np
 
@@ -10,14 +10,14 @@ from tools.tuning.frequency_response import GRID_SIZE
 from tools.tuning.loop_figures import LoopFigures, Loops, loop_figures
 
 _CRUISE_TO, _RAMP_TO = 0.5, 0.5
-"""Shares of the greatest speed."""
+"""Shares of the maximum speed."""
 _RUNS = 4
 _SETTLED_S, _MEASURED_S = 0.5, 1.0
 _RAMP_S = 1.0
 
 
 def noise(config: TableConfig, seed: int) -> Check:
-    """Turn at the constant speed at which the encoder's counts cause the most noise, and on a slow ramp."""
+    """Turn at the constant speed at which the encoder's counts cause the maximum noise, and on a slow ramp."""
     loops = Loops.of([config], GRID_SIZE)
     ramp, hold = (
         loop_figures(loops, np.array([fixed_gains(config, gains)])) for gains in (config.gains.ramp, config.gains.hold)
@@ -50,7 +50,7 @@ def noise(config: TableConfig, seed: int) -> Check:
 
 
 def noisy_speed_deg_s(config: TableConfig, figures: LoopFigures) -> float:
-    """Return the greatest speed up to half the limit that is as noisy as the worst one."""
+    """Return the maximum speed up to half of the limit with the noise of the worst one."""
     part = float(figures.noisy_count_tick[0])
     most = _CRUISE_TO * config.limits.speed_deg_s * config.counts_per_deg / config.control.tick_hz
     counts = (np.floor(most) - 1.0, np.floor(most))
@@ -60,7 +60,7 @@ def noisy_speed_deg_s(config: TableConfig, figures: LoopFigures) -> float:
 
 
 def _steady(config: TableConfig, speed_deg_s: float, seed: int) -> tuple[Array, Array, float]:
-    """Return a stretch of the duty at a constant speed, and the mean of its standard deviation over several starts."""
+    """Return a segment of the duty at a constant speed, and the mean of its standard deviation over several starts."""
     acceleration = config.limits.acceleration_deg_s2
     begin_s = 0.1 + speed_deg_s / acceleration + _SETTLED_S
     motions = [Motion(0.1, far_deg(config), speed_deg_s, acceleration)]
@@ -74,7 +74,7 @@ def _steady(config: TableConfig, speed_deg_s: float, seed: int) -> tuple[Array, 
 
 
 def _on_ramp(config: TableConfig, seed: int) -> float:
-    """Return the standard deviation of the duty about its trend on a ramp, the mean over several starts."""
+    """Return the standard deviation of the duty around its trend on a ramp, the mean over several starts."""
     speed = _RAMP_TO * config.limits.speed_deg_s
     acceleration = min(config.limits.acceleration_deg_s2, speed / _RAMP_S)
     end_s = 0.1 + speed / acceleration

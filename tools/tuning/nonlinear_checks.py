@@ -1,4 +1,4 @@
-"""Checks of what no linear model has: small moves from rest, reversal through the backlash, creep against stiction."""
+"""Checks without a linear model: small moves from rest, reversal through the backlash, creep against stiction."""
 
 import numpy as np
 
@@ -8,15 +8,15 @@ from tools.emulated import Answer, Motion, emulate
 from tools.tuning.check import Check, Curve, Figure, far_deg, greatest_ramp
 
 _CREEP = 0.005
-"""Share of the greatest speed."""
+"""Share of the maximum speed."""
 _CREEP_S, _SETTLED_CREEP_S = 4.0, 1.0
-"""Duration of the creep after the gap, and how long the table has then moved before its ripple is measured."""
+"""Duration of the creep after the gap, and travel of the table before its ripple is measured."""
 _SMALL_MOVES_DEG = (0.1, 0.2, 0.5, 1.0, 3.0)
 _LONGEST_SETTLING_S = 10.0
 
 
 def small_moves(config: TableConfig, seed: int) -> Check:
-    """Make small moves from rest, there and back, each with time enough to come to rest."""
+    """Make small moves from rest, forward and backward, each with time enough to come to rest."""
     speed, acceleration = config.power_on.speed_deg_s, config.power_on.acceleration_deg_s2
     longest_deg = 2.0 * max(_SMALL_MOVES_DEG)
     pause_s = longest_deg / speed + speed / acceleration + min(config.protection.settling_time_s, _LONGEST_SETTLING_S)
@@ -39,7 +39,7 @@ def small_moves(config: TableConfig, seed: int) -> Check:
 
 
 def reversal(config: TableConfig, seed: int) -> Check:
-    """Turn back at speed, through the backlash."""
+    """Reverse at speed, through the backlash."""
     speed, acceleration, ramp_s = greatest_ramp(config)
     at_s = 0.6 + ramp_s
     motions = [Motion(0.1, far_deg(config), speed, acceleration), Motion(at_s, -far_deg(config), speed, acceleration)]
@@ -54,7 +54,7 @@ def reversal(config: TableConfig, seed: int) -> Check:
         (
             Figure(
                 "reversal_lag_deg",
-                "most that the encoder is behind in a reversal",
+                "maximum lag of the encoder in a reversal",
                 "deg",
                 float(np.abs(error[window]).max()),
                 None,
@@ -64,7 +64,10 @@ def reversal(config: TableConfig, seed: int) -> Check:
 
 
 def creep(config: TableConfig, seed: int) -> Check:
-    """Creep, where stiction and the quantum of the speed weigh most; the table moves once the gap is crossed."""
+    """Creep, where stiction and the resolution of the speed have the largest effect.
+
+    The table moves after the gap is crossed.
+    """
     speed = _CREEP * config.limits.speed_deg_s
     crossing_s = config.gears.backlash_arcmin / 60.0 / speed
     motions = [Motion(0.1, far_deg(config), speed, 5.0 * speed)]

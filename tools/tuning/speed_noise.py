@@ -1,8 +1,9 @@
 """The noise at the PWM while the table turns at a constant speed, and the speed at which it is worst.
 
-At a constant speed the rounding of the position to counts is not white. At f counts a tick its error is a sawtooth that
-repeats f times a tick: a line of power 1 / (2 pi^2 m^2) count^2 at each harmonic m f, folded at the tick rate. The
-regulator amplifies each line by its own response, so some speeds are noisier than a ramp, which passes all of them.
+At a constant speed the rounding of the position to counts is not white. At f counts per tick its error is a sawtooth
+that repeats f times per tick. It has a line of power 1 / (2 pi^2 m^2) count^2 at each harmonic m f, folded at the tick
+rate. The PID amplifies each line by its own response, so some speeds have more noise than a ramp, which passes all of
+them.
 """
 
 from functools import lru_cache
@@ -17,11 +18,11 @@ _HARMONICS = 200
 
 
 def steady_noise(power: Array, most_count_tick: float) -> tuple[Array, Array]:
-    """Return the worst standard deviation over all constant speeds, and the part of a count a tick where it is.
+    """Return the worst standard deviation over all constant speeds, and its fraction of a count per tick.
 
     Args:
         power: (..., n) squared response to an error of the position of one count, on `frequency_response.grid_z`.
-        most_count_tick: The greatest speed; it limits the search where the table makes less than half a count a tick.
+        most_count_tick: the maximum speed; it limits the search if the table makes less than half a count per tick.
     """
     share, lines = _lines(power.shape[-1])
     reached = max(1, int(np.searchsorted(share, most_count_tick, side="right")))
@@ -34,7 +35,7 @@ def steady_noise(power: Array, most_count_tick: float) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=4)
 def _lines(count: int) -> tuple[Array, Array]:
-    """Return speeds up to half a count a tick, and for each the power that its sawtooth has at each frequency."""
+    """Return speeds up to half a count per tick, and for each the power of its sawtooth at each frequency."""
     size = 2 * count
     speed = np.unique(np.linspace(1, count, min(_SPEEDS, count)).round().astype(int))
     harmonic = np.arange(1, _HARMONICS + 1)

@@ -1,7 +1,7 @@
-"""Textbook tuning rules for a process of first order with a delay, to compare the tuned gain sets with.
+"""Textbook tuning rules for a first-order process with a delay, for comparison with the tuned gain sets.
 
-The process is the table that the motor drives: gain k from duty to speed, time constant T, delay L. L is half
-the speed's window, the tick of the PWM's buffer, and half a tick of the PWM's hold.
+The process is the table driven by the motor: gain k from duty to speed, time constant T, delay L. L is half of the
+speed's window, plus the tick of the PWM's buffer, plus half a tick of the PWM's hold.
 
     SIMC   S. Skogestad, "Simple analytic rules for model reduction and PID controller tuning", J. Process Control 13
            (2003) 291-309: a closed-loop time constant equal to the delay.
@@ -24,7 +24,7 @@ class Process(NamedTuple):
 
 
 def process_of(config: TableConfig) -> Process:
-    """Return the process of first order with a delay that stands for a table."""
+    """Return the first-order process with a delay that approximates a table."""
     control = config.control
     delay_s = (0.5 * control.speed_window_ticks + 1.5) / control.tick_hz
     return Process(speed_gain_deg_s(config), time_constant_s(config, Teeth.DRIVING), delay_s)

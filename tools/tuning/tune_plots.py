@@ -1,4 +1,4 @@
-"""The figures of a tuning's report: answers in time, Bode and Nyquist plots, the spread of Ms."""
+"""The figures of a tuning report: responses over time, Bode and Nyquist plots, the spread of Ms."""
 
 from typing import Any
 
@@ -16,14 +16,14 @@ from tools.tuning.margins import controller
 from tools.tuning.tuned_table import Tuning, Words
 
 _CREEP_S = 0.25
-"""Time that is drawn of the creep: a longer one is a band in which no curve can be seen."""
+"""Drawn time of the creep: over a longer time the curves are not distinguishable."""
 _PLOT_GRID = 4096
 _TITLES = {
     Teeth.DRIVING: "motor drives table",
     Teeth.OVERHAULING: "table drives motor",
     Teeth.FREE: "free in the backlash",
 }
-_LINES: dict[Teeth, Any] = {  # told apart without color too, and where one lies upon the other
+_LINES: dict[Teeth, Any] = {  # distinguishable without color too, and where they overlap
     Teeth.DRIVING: {"color": BLUE, "linewidth": 2.4},
     Teeth.OVERHAULING: {"color": GREEN, "linestyle": "--"},
     Teeth.FREE: {"color": AMBER, "linestyle": ":", "linewidth": 2.0},
@@ -81,7 +81,9 @@ def _bode(tuning: Tuning) -> Drawing:
     for column, tuned in enumerate(tuning.sets.values()):
         loops, responses = _loops(tuning, tuned.design.gains)
         size, phase = drawing.axes[column], drawing.axes[column + 2]
-        seen = loops.frequency_hz < control.tick_hz / control.speed_window_ticks  # where the window has its first zero
+        seen = (
+            loops.frequency_hz < control.tick_hz / control.speed_window_ticks
+        )  # first zero of the response of the window
         for teeth, response in responses.items():
             size.semilogx(loops.frequency_hz, 20.0 * np.log10(np.abs(response)), **_LINES[teeth], label=_TITLES[teeth])
             phase.semilogx(loops.frequency_hz[seen], np.degrees(np.unwrap(np.angle(response[seen]))), **_LINES[teeth])

@@ -1,11 +1,11 @@
-"""The report of a tuning: what came out, why it is bounded there, and how model and emulator agree."""
+"""The report of a tuning: the results, their binding bounds, and the agreement of model and emulator."""
 
 import numpy as np
 
 from emulator.firmware.pid import Gains
 from protocol.page import Cell, Kind, Marked, Origin, details, figure, heading, page, paragraph, table
 from protocol.page import verdict as headline
-from tools.tuning.bounds import Bound
+from tools.bounds import Bound
 from tools.tuning.check import Figure
 from tools.tuning.checks import differs
 from tools.tuning.comparison_report import textbook_table, trade_table
@@ -16,7 +16,7 @@ from tools.tuning.tuned_table import JUDGED, TunedSet, Tuning, Words
 from tools.tuning.way_out import changes
 
 _SAME_SHARE = 0.05
-"""Answers on the emulator that differ by less are as good as each other: so much depends on where the counts lie."""
+"""Emulator results with a smaller difference count as equal: the position of the counts has this effect."""
 
 
 def tune_report(tuning: Tuning, drawings: dict[str, str], origin: Origin | None = None) -> str:
@@ -33,7 +33,7 @@ def tune_report(tuning: Tuning, drawings: dict[str, str], origin: Origin | None 
             details("Spread of the plant", _spread_section(tuning, drawings)),
             details("What the bound on the noise costs", _trade_section(tuning)),
             details("Textbook rules", _textbook_section(tuning)),
-            details("What the model takes as noise", paragraph(_noise(tuning))),
+            details("Quantization noise in the model", paragraph(_noise(tuning))),
         ],
         origin,
     )
@@ -56,18 +56,18 @@ def _change(old: float, new: float) -> str:
 
 
 def verdict(tuning: Tuning) -> str:
-    """Return in a sentence whether the bounds hold: which are binding, or which are broken and by what."""
+    """Return in a sentence whether the bounds are satisfied: which are binding, or which are violated and by what."""
     if tuning.feasible:
         parts = [f"{tuned.title}: bounded by {_names(tuned.design.binding)}" for tuned in tuning.sets.values()]
-        return f"Both sets keep all bounds ({'; '.join(parts)})."
+        return f"Both sets satisfy all bounds ({'; '.join(parts)})."
     parts = [f"the {tuned.title} {_broken(tuned.design)}" for tuned in tuning.sets.values() if tuned.design.broken]
     if tuning.words == JUDGED:
-        return f"Not all bounds hold: {'; '.join(parts)}."
+        return f"Not all bounds are satisfied: {'; '.join(parts)}."
     way = ""
     if tuning.eased is not None:
         options = " ".join(after.option for _, after in changes(tuning.limits, tuning.eased))
-        way = f" With {options} both sets keep all bounds."
-    return f"No gains keep all bounds: {'; '.join(parts)}.{way} This report judges the nearest gains."
+        way = f" With {options} both sets satisfy all bounds."
+    return f"No gains satisfy all bounds: {'; '.join(parts)}.{way} This report judges the nearest gains."
 
 
 def _broken(design: Design) -> str:
@@ -141,13 +141,13 @@ def _frequency_section(drawings: dict[str, str]) -> str:
     ) + figure(
         drawings["nyquist"],
         "The loop in the complex plane, for both gain sets.",
-        "Nyquist plots; the circle is what the bound on Ms keeps free about -1.",
+        "Nyquist plots; the circle around -1 is excluded by the bound on Ms.",
     )
 
 
 def _spread_section(tuning: Tuning, drawings: dict[str, str]) -> str:
     text = (
-        f"{tuning.plants:,} tables whose constants lie uniformly within "
+        f"{tuning.plants:,} tables whose constants are uniformly distributed within "
         f"{100 * tuning.spread:.0f} % about the configured ones."
     )
     caption = (
@@ -250,9 +250,9 @@ def _differences(tuning: Tuning) -> list[str]:
         others = ", ".join(f"{value:.3g} without {effect}" for effect, value in without.items())
         texts.append(
             f"{differing.title}: {differing.emulator:.3g} {differing.unit}; the model predicts {differing.model:.3g}."
-            f" On the emulator it would be {others}. What then still differs is the rounding, of the speed to quanta"
-            f" of {quantum:.3g} deg/s and of the PWM, the dry friction of a table that comes to a stand or turns back, "
-            "and a duty that is at its limit."
+            f" On the emulator it would be {others}. The remaining differences are due to the rounding of the speed"
+            f" to steps of {quantum:.3g} deg/s and of the PWM. Other causes are the dry friction of a table that stops"
+            " or reverses, and a duty at its limit."
         )
     return texts
 
@@ -276,7 +276,7 @@ def _noise(tuning: Tuning) -> str:
     count_deg, duty = quantization_noise(tuning.before)
     return (
         f"The position is rounded to counts, a white noise of {count_deg:.2g} deg (standard "
-        "deviation), which the regulator turns into the noise at the PWM on a ramp. At a constant speed the rounding "
+        "deviation). The PID turns it into the noise at the PWM on a ramp. At a constant speed the rounding "
         "repeats, and is a sawtooth instead: the bound holds for the worst speed. The PWM is rounded to "
         f"steps, a white noise of {100 * duty:.2g} % duty at the plant's input."
     )

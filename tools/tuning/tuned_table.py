@@ -1,4 +1,4 @@
-"""The whole tuning: design, judgement of the present gains beside it, Monte Carlo, checks on the emulator."""
+"""The whole tuning: design, judgement of the present gains for comparison, Monte Carlo, checks on the emulator."""
 
 from collections.abc import Callable
 from math import ceil, log2
@@ -10,8 +10,8 @@ import numpy as np
 from emulator.config.constants import fixed_gains
 from emulator.config.table_config import GainSetsConfig, TableConfig
 from emulator.firmware.pid import Gains
+from tools.bounds import Limits, TuningError
 from tools.emulated import with_gains
-from tools.tuning.bounds import Limits
 from tools.tuning.check import Check
 from tools.tuning.checks import Difference, all_checks, differences
 from tools.tuning.gain_design import Design, Scan, scan
@@ -26,12 +26,8 @@ from tools.tuning.way_out import SetDesigns, both_designs, changes, eased_limits
 _LEAST_ANSWER_S = 0.5
 
 
-class TuningError(ValueError):
-    """An option that cannot be used, or bounds that cannot be kept; the message says which, and what works."""
-
-
 class TunedSet(NamedTuple):
-    """One gain set, as it was and as it is now."""
+    """One gain set, before and after the tuning."""
 
     title: str
     before: Gains
@@ -51,7 +47,7 @@ TUNED, JUDGED = Words("former", "tuned"), Words("configured", "given")
 
 
 class Tuning(NamedTuple):
-    """The outcome, of a search for gains or of gains that were given."""
+    """The result of a search for gains, or for given gains."""
 
     before: TableConfig
     after: TableConfig
@@ -59,7 +55,7 @@ class Tuning(NamedTuple):
     checks: tuple[tuple[Check, Check], ...]  # before and after
     differences: tuple[Difference, ...]  # of the tuned table from the model
     limits: Limits
-    eased: Limits | None  # where no gains keep the limits: others, near to them, that can be kept
+    eased: Limits | None  # if no gains satisfy the limits: the nearest limits that can be satisfied
     trades: tuple[Trade, ...]
     textbook: dict[str, Design]
     plants: int
@@ -68,51 +64,56 @@ class Tuning(NamedTuple):
 
     @property
     def feasible(self) -> bool:
-        """Whether both sets keep all bounds."""
+        """Whether both sets satisfy all bounds."""
         return not any(tuned.design.broken for tuned in self.sets.values())
 
 
-def tune(
-    config: TableConfig,
-    limits: Limits,
-    plants: int,
-    spread: float,
-    seed: int,
-    progress: Callable[[float], None] = lambda _: None,
-) -> Tuning:
-    """Return the gain sets that are best within the limits, or nearest to them, and how they do.
+class Terms(NamedTuple):
+    """What gain sets are judged by: bounds, and random tables about the configured one.
+
+    Attributes:
+        limits: the bounds.
+        plants: the number of random tables.
+        spread: by which share of itself each of their constants may differ.
+        seed: of tables and checks.
+    """
+
+    limits: Limits
+    plants: int
+    spread: float
+    seed: int
+
+
+def tune(config: TableConfig, terms: Terms, progress: Callable[[float], None] = lambda _: None) -> Tuning:
+    """Return the best gain sets within the limits, or the nearest ones, and their results.
 
     Raises:
-        TuningError: No gains make both loops stable.
+        TuningError: no gains make both loops stable.
     """
-    size = grid_size(config, limits)
-    loops = Loops.of([config], size)
-    scanned = scan(loops)
+    limits = terms.limits
+    scanned = scan(Loops.of([config], grid_size(config, limits)))
     progress(0.1)
     designs = both_designs(scanned, limits)
     if not designs.stable:
         raise TuningError("no gains make the speed loop stable; shorten control.speed_window_ticks or the tick")
     eased = _eased(scanned, limits, designs) if designs.broken else None
     progress(0.3)
-    return examined(scanned, limits, eased, (designs.ramp, designs.hold), plants, spread, seed, progress, TUNED)
+    return examined(scanned, terms, eased, (designs.ramp, designs.hold), progress, TUNED)
 
 
 def examined(
     scanned: Scan,
-    limits: Limits,
+    terms: Terms,
     eased: Limits | None,
     designs: tuple[Design, Design],
-    plants: int,
-    spread: float,
-    seed: int,
     progress: Callable[[float], None],
     words: Words,
 ) -> Tuning:
-    """Return how the gain sets of two designs do on a table, beside those of its configuration."""
+    """Return the results of the gain sets of two designs on a table, and those of its configuration."""
     loops, (ramp, hold) = scanned.loops, designs
-    config = loops.config
+    config, (limits, plants, spread, seed) = loops.config, terms
     after = with_gains(config, gains_config(config, ramp.gains), gains_config(config, hold.gains))
-    # Half as fine as for the design: no loop within the bounds needs more.
+    # Half as fine as for the design, which is sufficient for all loops within the bounds.
     tables = spread_tables(config, plants, spread, seed)
     outcomes = monte_carlo(tables, designs, len(loops.z), lambda share: progress(0.3 + 0.2 * share))
     before = [fixed_gains(config, gains) for gains in (config.gains.ramp, config.gains.hold)]
@@ -136,31 +137,27 @@ def examined(
 
 
 def judge(
-    config: TableConfig,
-    gains: GainSetsConfig,
-    limits: Limits,
-    plants: int,
-    spread: float,
-    seed: int,
-    progress: Callable[[float], None] = lambda _: None,
+    config: TableConfig, gains: GainSetsConfig, terms: Terms, progress: Callable[[float], None] = lambda _: None
 ) -> Tuning:
-    """Return how given gain sets do on a table, within the limits or not, beside those of its configuration.
+    """Return the results of given gain sets on a table, within the limits or not, and those of its configuration.
 
     Raises:
-        ConfigError: The firmware cannot hold the gains.
+        ConfigError: the gains do not fit the firmware.
     """
+    limits = terms.limits
     loops = Loops.of([config], grid_size(config, limits))
     scanned, designs = scan(loops), []
     for given, bounds in ((gains.ramp, limits.for_ramp()), (gains.hold, limits.for_hold())):
         held = registers(config, given)
         designs.append(Design(held, settled_figures(loops, held), bounds))
-    return examined(scanned, limits, None, (designs[0], designs[1]), plants, spread, seed, progress, JUDGED)
+    return examined(scanned, terms, None, (designs[0], designs[1]), progress, JUDGED)
 
 
 def settled_figures(loops: Loops, gains: Gains) -> LoopFigures:
-    """Return the figures of any one gain set, however slow or unstable, of the one table of the loops.
+    """Return the figures of any one gain set, however slow or unstable, for the one table of the loops.
 
-    `loop_figures` takes the answers in time from the grid of frequencies, which holds no answer longer than the grid.
+    `loop_figures` computes the responses over time from the grid of frequencies, which contains no response longer than
+    the grid.
     """
     figures = loop_figures(loops, np.array([gains]))
     states = {teeth: closed_loop(loops.config, teeth, gains) for teeth in Teeth}
@@ -184,13 +181,13 @@ def settled_figures(loops: Loops, gains: Gains) -> LoopFigures:
 
 
 def grid_size(config: TableConfig, limits: Limits) -> int:
-    """Return the ticks, a power of two, in which the slowest loop within the limits has answered to a step."""
+    """Return the ticks, a power of two, in which the slowest loop within the limits has responded to a step."""
     answer_s = max(_LEAST_ANSWER_S, 5.0 / limits.bandwidth_hz, 5.0 * limits.settling_s)
     return 1 << ceil(log2(answer_s * config.control.tick_hz))
 
 
 def _eased(scanned: Scan, limits: Limits, refused: SetDesigns) -> Limits | None:
-    """Return limits that can be kept, proved on the grid on which a tuning within them would search."""
+    """Return limits that can be satisfied, proved on the grid of a tuning with these limits."""
     eased, config = eased_limits(scanned, limits, refused), scanned.loops.config
     if eased is None or grid_size(config, eased) == grid_size(config, limits):
         return eased

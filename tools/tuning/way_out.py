@@ -1,17 +1,17 @@
-"""Where no gains keep all bounds: bounds, eased in as few places as possible, within which both gain sets exist."""
+"""Relax bounds that no gains satisfy, in as few places as possible, until both gain sets exist."""
 
 from collections.abc import Sequence
 from functools import partial
 from itertools import combinations
 from typing import NamedTuple
 
-from tools.tuning.bounds import Bound, Limits, violation
+from tools.bounds import Bound, Limits, violation
 from tools.tuning.gain_design import LEAST_LAG, LEAST_LOAD_PEAK, Design, Objective, Scan, design
 
 _MOST_EASED = 2
 _TRIES = 5
 _ZOOMS = 3
-"""Enough to see by how much a bound has to give way: its new value is rounded to two digits."""
+"""Sufficient to find how far a bound must be relaxed: its new value is rounded to two digits."""
 _LOOSER = 0.05
 
 
@@ -23,7 +23,7 @@ class SetDesigns(NamedTuple):
 
     @property
     def broken(self) -> tuple[Bound, ...]:
-        """The bounds that one of the sets or both break."""
+        """The bounds that one of the sets or both violate."""
         return tuple({bound.figure: bound for each in self for bound in each.broken}.values())
 
     @property
@@ -33,15 +33,15 @@ class SetDesigns(NamedTuple):
 
 
 def both_designs(scanned: Scan, limits: Limits) -> SetDesigns:
-    """Return the best gain sets within the limits, or those that break them least."""
+    """Return the best gain sets within the limits, or those with the smallest violation."""
     return SetDesigns(*(design(scanned, bounds, objective) for bounds, objective in _tasks(limits)))
 
 
 def eased_limits(scanned: Scan, limits: Limits, refused: SetDesigns) -> Limits | None:
-    """Return limits within which both sets exist; None if no loop is stable.
+    """Return limits with which both sets exist; None if no loop is stable.
 
-    Of one bound, or where that is not enough two, those are eased that need it least. Where that is not enough either,
-    all bounds that the nearest gains break are eased to what these keep.
+    The bound that needs the smallest change is relaxed; if one bound is not sufficient, two. If two are not sufficient,
+    all bounds that the nearest gains violate are relaxed to the values of these gains.
     """
     if not refused.stable:
         return None
@@ -57,7 +57,7 @@ def eased_limits(scanned: Scan, limits: Limits, refused: SetDesigns) -> Limits |
 
 
 def changes(limits: Limits, eased: Limits) -> tuple[tuple[Bound, Bound], ...]:
-    """Return the bounds that differ, as they were and as they are eased."""
+    """Return the bounds that differ, before and after the change."""
     pairs = zip(limits.for_hold(), eased.for_hold(), strict=True)
     return tuple((before, after) for before, after in pairs if before != after)
 
@@ -67,7 +67,10 @@ def _tasks(limits: Limits) -> tuple[tuple[tuple[Bound, ...], Objective], ...]:
 
 
 def _eased_in(scanned: Scan, limits: Limits, group: tuple[str, ...]) -> Limits | None:
-    """Return the limits with the bounds of a group as near as possible to what was asked; None if others break."""
+    """Return the limits with the bounds of a group as near as possible to the requested ones.
+
+    The result is None if other bounds are violated.
+    """
     designs = []
     for bounds, objective in _tasks(limits):
         eased = tuple(bound for bound in bounds if bound.figure in group)
@@ -80,7 +83,7 @@ def _eased_in(scanned: Scan, limits: Limits, group: tuple[str, ...]) -> Limits |
 
 
 def _allowing(limits: Limits, designs: Sequence[Design], figures: set[str]) -> Limits:
-    """Return the limits with some eased so far that each of the designs keeps them; none becomes stricter."""
+    """Return the limits with some relaxed so far that each of the designs satisfies them; none becomes stricter."""
     eased = {}
     for bound in limits.for_hold():
         values = [float(getattr(each.figures, bound.figure)[0]) for each in designs if _has(each, bound)]
@@ -91,13 +94,13 @@ def _allowing(limits: Limits, designs: Sequence[Design], figures: set[str]) -> L
 
 
 def _has(designed: Design, bound: Bound) -> bool:
-    """Return whether a bound is one of the set's: the ramp set has none on its answer to a step."""
+    """Return whether a bound belongs to the set: the ramp set has none for its response to a step."""
     figures = {each.figure for each in designed.bounds}
     return bound.figure in figures or bound.figure in {each.figure for each in Limits().for_ramp()}
 
 
 def proved(scanned: Scan, limits: Limits, eased: Limits, group: set[str]) -> Limits | None:
-    """Return eased limits for which the search finds both sets, with the group's bounds looser if need be."""
+    """Return relaxed limits for which the search finds both sets, with looser bounds of the group if necessary."""
     for _ in range(_TRIES):
         designs = both_designs(scanned, eased)
         if designs.stable and not designs.broken:
@@ -111,5 +114,5 @@ def proved(scanned: Scan, limits: Limits, eased: Limits, group: set[str]) -> Lim
 
 
 def _cost(limits: Limits, eased: Limits) -> float:
-    """Return by what share the eased bounds are away from what was asked."""
+    """Return the relative difference of the relaxed bounds from the requested ones."""
     return sum(abs(after.limit / before.limit - 1.0) for before, after in changes(limits, eased))

@@ -11,6 +11,7 @@
 #define RECEIVE_LIMIT 64
 #define RECEIVE_SIZE 128  /* a power of two, with room for the marker */
 #define TRANSMIT_SIZE 64  /* a power of two */
+#define TRANSMIT_LIMIT 63 /* with the byte in the transmitter 64 */
 #define LONGEST_REPLY (LINE_LIMIT + 1)
 
 #define CR 0x0D
@@ -79,7 +80,7 @@ void line_release(void)
 
 static uint8_t transmit_room(void)
 {
-    return (uint8_t)(TRANSMIT_SIZE - (uint8_t)(transmit_head - transmit_tail));
+    return (uint8_t)(TRANSMIT_LIMIT - (uint8_t)(transmit_head - transmit_tail));
 }
 
 void line_write(const char *bytes, uint8_t length)

@@ -48,6 +48,7 @@ struct chip {
     uint64_t tick_cycles;    /* of all ticks together */
     uint32_t ticks;
     uint32_t lost_edges;     /* interrupts that came while the last one of the same channel still waited */
+    uint32_t duty_changes;   /* ticks amid which the duty became another */
     uint32_t overrun_bytes;  /* that came while two others waited in the hardware */
     int32_t line_count;      /* bytes that are leaving */
     uint32_t sent_count;     /* bytes whose stop bit has left */
@@ -57,7 +58,7 @@ struct chip {
     avr_uart_t *uart;
     avr_irq_t *channel[2], *trigger;
     avr_cycle_count_t tick_period, tick_entry, slice_end, byte_cycles, line_free;
-    uint8_t has_ticked, phase, is_unguarded;
+    uint8_t has_started, has_ticked, phase, is_unguarded;
     struct event events[MOST_EVENTS];
     int first_event, event_count;
     uint8_t on_the_line[MOST_SENT];
@@ -87,11 +88,19 @@ static avr_cycle_count_t beat(avr_t *avr, avr_cycle_count_t when, void *param)
     return when + BEAT;
 }
 
+static int32_t bridge_duty(const struct chip *chip)
+{
+    const uint8_t *data = chip->avr->data;
+    const int32_t steps = data[OCR1A_LOW] | data[OCR1A_HIGH] << 8;
+    return data[PINS_B] & DIRECTION ? -steps : steps;
+}
+
 static void tick_changed(avr_irq_t *irq, uint32_t is_running, void *param)
 {
     struct chip *chip = param;
     (void)irq;
     if (is_running) {
+        chip->duty_changes += chip->has_started && bridge_duty(chip) != chip->duty;
         chip->has_ticked = 1;
         chip->tick_entry = chip->avr->cycle;
         chip->slice_end = chip->avr->cycle + AFTER_TICK;
@@ -199,8 +208,8 @@ static int run_slice(struct chip *chip)
             return -1;
         }
     }
-    const int32_t steps = avr->data[OCR1A_LOW] | avr->data[OCR1A_HIGH] << 8;
-    chip->duty = avr->data[PINS_B] & DIRECTION ? -steps : steps;
+    chip->duty = bridge_duty(chip);
+    chip->has_started = 1;
     while (chip->line_count && chip->left_at[chip->line_first] <= avr->cycle && chip->sent_count < MOST_SENT) {
         chip->sent[chip->sent_count++] = chip->on_the_line[chip->line_first];
         chip->line_first = (chip->line_first + 1) % MOST_SENT;

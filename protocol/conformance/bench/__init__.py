@@ -1,1 +1,1 @@
-"""The table under test: its wire, and what can be done to it beside the wire."""
+"""The table under test: its serial line, and what the test bench can do to it."""

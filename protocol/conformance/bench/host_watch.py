@@ -1,8 +1,8 @@
-"""Is the machine that tests punctual? A watch that keeps a busy machine from failing a table.
+"""Measure scheduling delays of the machine that runs the tests, so that a busy machine does not fail a table.
 
-A busy machine wakes programs late, and its kernel may keep the bytes of a serial line to itself, for a second and more:
-then a reply is missing that the table gave in time, and nothing on the wire tells one from the other. So the watch has
-a line of its own, a pseudo-terminal with no table, and sends itself a beat through it all the time.
+A busy machine runs programs late, and its kernel may hold back the bytes of a serial line for more than a second. Then
+a reply is missing that the table sent in time, and the line shows no difference. The watch therefore has its own line:
+a pseudo-terminal without a table. It sends a beat through that line all the time.
 """
 
 import os
@@ -15,31 +15,31 @@ from typing import Protocol, Self
 _PERIOD_S = 0.01
 _LOOK_S = 0.1
 _CALM_S = 1.0
-"""A machine that was punctual for this long is calm again."""
+"""A machine without delays for this time is calm again."""
 
 
 class Watch(Protocol):
-    """What a session asks about the machine that it runs on."""
+    """Data of the machine that a session runs on."""
 
     def restart(self) -> None:
-        """Forget how late the machine has been."""
+        """Reset the maximum delay."""
         ...
 
     def late_s(self) -> float:
-        """Return by how much the machine has been late at most since `restart`."""
+        """Return the maximum delay since `restart`."""
         ...
 
     def lap_s(self) -> float:
-        """Return by how much the machine has been late at most since the last call."""
+        """Return the maximum delay since the last call."""
         ...
 
     def wait_for_calm(self, allowed_s: float, patience_s: float) -> None:
-        """Return when the machine has not been later than `allowed_s` for a while, or when patience ends."""
+        """Return when no delay has exceeded `allowed_s` for a while, or when the patience is over."""
         ...
 
 
 class Punctual:
-    """The watch in simulated time, where nothing is late."""
+    """The watch in simulated time, which has no delays."""
 
     def restart(self) -> None:
         """Do nothing."""
@@ -57,9 +57,9 @@ class Punctual:
 
 
 class HostWatch:
-    """Sends a beat through a pseudo-terminal every 10 ms, from a thread, for as long as a `with` block lasts.
+    """Sends a beat through a pseudo-terminal every 10 ms, from a thread, during a `with` block.
 
-    A beat is as late as it is back after it was due to be sent.
+    The delay of a beat is the time from when it was due until it is received.
     """
 
     def __init__(self) -> None:
@@ -80,20 +80,20 @@ class HostWatch:
         os.close(self._receiver)
 
     def restart(self) -> None:
-        """Forget how late the machine has been."""
+        """Reset the maximum delay."""
         self._worst_s = 0.0
 
     def late_s(self) -> float:
-        """Return by how much the machine has been late at most since `restart`, with the beat that is under way."""
+        """Return the maximum delay since `restart`, including the beat under way."""
         return max(self._worst_s, time.monotonic() - self._due_s)
 
     def lap_s(self) -> float:
-        """Return by how much the machine has been late at most since the last call, with the beat under way."""
+        """Return the maximum delay since the last call, including the beat under way."""
         worst_s, self._worst_of_lap_s = self._worst_of_lap_s, 0.0
         return max(worst_s, time.monotonic() - self._due_s)
 
     def wait_for_calm(self, allowed_s: float, patience_s: float) -> None:
-        """Return when the machine has not been later than `allowed_s` for a second, or when patience ends."""
+        """Return when no delay has exceeded `allowed_s` for a second, or when the patience is over."""
         deadline_s = time.monotonic() + patience_s
         calm_since_s = time.monotonic()
         while time.monotonic() < min(deadline_s, calm_since_s + _CALM_S):
@@ -116,5 +116,8 @@ class HostWatch:
 
 
 def watch_in(simulated: bool) -> AbstractContextManager[Watch]:
-    """Return the watch for simulated time or real; without pseudo-terminals, as on Windows, a machine is trusted."""
+    """Return the watch for simulated or real time.
+
+    Without pseudo-terminals, as on Windows, the machine is assumed to have no delays.
+    """
     return HostWatch() if not simulated and hasattr(os, "openpty") else nullcontext(Punctual())

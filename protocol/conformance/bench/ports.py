@@ -1,4 +1,4 @@
-"""Opening the port of the table under test."""
+"""Open the port of the table under test."""
 
 from pathlib import Path
 
@@ -6,18 +6,18 @@ from protocol.conformance.bench.wire import ReopenablePort
 from protocol.conformance.profile.profile import Profile
 
 _STAND_IN_PACKAGE = "emulator"
-"""Where pyserial looks for the emulator's own kind of URL, `emulator://`; it need not be installed."""
+"""Where pyserial looks for the emulator's URL scheme, `emulator://`. The emulator need not be installed."""
 
 
 class SessionError(Exception):
-    """What is at the port cannot be tested; the message says why and what to do."""
+    """The device at the port cannot be tested. The message states why, and the next step."""
 
 
 def open_port(url: str, profile: Profile) -> ReopenablePort:
-    """Open a device or any URL of pyserial's, at the profile's rate, with a lock that keeps out others of this kit.
+    """Open a device or any pyserial URL, at the profile's rate. A lock keeps out other processes of this kit.
 
     Raises:
-        SessionError: it cannot be opened.
+        SessionError: the port cannot be opened.
     """
     import serial  # noqa: PLC0415 - the pytest plug-in is loaded by runs that need no port
 
@@ -36,11 +36,11 @@ def open_port(url: str, profile: Profile) -> ReopenablePort:
 
 
 def is_simulated(port: object) -> bool:
-    """Return whether the port carries its own clock: then nothing real moves behind it."""
+    """Return whether the port has its own clock: then the table is simulated."""
     return getattr(port, "clock", None) is not None
 
 
 def described(url: str) -> str:
-    """Return what device a URL leads to, links followed."""
+    """Return the device that a URL names, with symbolic links resolved."""
     path = Path(url)
     return f"{url} ({path.resolve()})" if path.is_symlink() else url

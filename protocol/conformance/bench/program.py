@@ -1,4 +1,4 @@
-"""Running a program of the test bench to its end."""
+"""Run a program of the test bench and wait for its end."""
 
 import os
 import signal
@@ -8,19 +8,20 @@ from tempfile import TemporaryFile
 from typing import IO
 
 _MOST_SAID = 200
-"""Of what a failing program said, the last characters are shown."""
+"""The number of characters shown from the end of a failing program's output."""
 
 
 def failure_of(command: Sequence[str], timeout_s: float) -> str:
-    """Run a program, and return in one line why it did not do its deed; nothing when it ended with status 0.
+    """Run a program, and return in one line why it failed; an empty string for status 0.
 
-    One that does not end in time is ended with all that it began; what it leaves in the background is not waited for.
+    A program that exceeds its time is ended with all its children. Background processes of a successful program are not
+    waited for.
     """
-    with TemporaryFile() as said:  # a pipe would be held open by what is left in the background
+    with TemporaryFile() as said:  # a background process would keep a pipe open
         try:
             status = _status_of(command, said, timeout_s)
         except subprocess.TimeoutExpired:
-            return f"did not end within {timeout_s:g} s, and was ended"
+            return f"did not end within {timeout_s:g} s and was ended"
         except OSError as error:
             return f"did not start: {error}"
         said.seek(0)
@@ -42,4 +43,4 @@ def _status_of(command: Sequence[str], said: IO[bytes], timeout_s: float) -> int
 def _quoted(said: bytes) -> str:
     words = " ".join(said.decode(errors="replace").split())
     shortened = words if len(words) <= _MOST_SAID else f"... {words[-_MOST_SAID:]}"
-    return f": {shortened}" if shortened else ", and said nothing"
+    return f": {shortened}" if shortened else " without output"

@@ -1,7 +1,7 @@
-"""What can be done to the table besides talking to it: trigger it, switch it off and on, preset its counter.
+"""Actions on the table without its serial line: trigger it, switch its power, preset its counter.
 
-Who stands behind the port decides which of these there are: a table in the same process (the port has a `table`), the
-control channel of an emulator, programs that the profile names, or nobody.
+Which actions exist depends on what the port leads to: a table in this process (the port has a `table`), the control
+channel of an emulator, programs that the profile names, or none of these.
 """
 
 import shlex
@@ -23,7 +23,7 @@ PRESET = "a way to preset the position counter"
 OBSERVER = "a view of the encoder beside the wire"
 ERROR_REPLIES = "error replies"
 STRICT = "strict Table 1 mode"
-DISCONNECT = "a table that sees its client go"
+DISCONNECT = "a table that detects when its client disconnects"
 PACING = "a paced line"
 RANDOM_SEARCH = "the library hypothesis"
 
@@ -33,18 +33,18 @@ _POWER_CYCLE_KEY = "rig.power_cycle_command"
 
 
 class Stand:
-    """What the rig can do beside the wire, here nothing; calling what is not among the capabilities is an error.
+    """Actions of the rig, here none. Calling an action that is not among the capabilities is an error.
 
     Attributes:
-        capabilities: what there is.
-        facts: the table's constants, where it can be asked for them.
+        capabilities: the available actions.
+        facts: the table's constants, if the rig can read them.
     """
 
     capabilities: frozenset[str] = frozenset()
     facts: TableFacts | None = None
 
     def trigger(self) -> None:
-        """Put one edge on the trigger input, now."""
+        """Apply one edge to the trigger input."""
         raise BenchError("the rig has no way to trigger the table")
 
     def power_cycle(self) -> None:
@@ -56,16 +56,16 @@ class Stand:
         raise BenchError(f"the rig has no way to preset the counter to {count}")
 
     def encoder_deg(self) -> float:
-        """Return the encoder's position now, as it is inside the table."""
+        """Return the position of the encoder now, as the table has it."""
         raise BenchError("the rig does not see the encoder")
 
     def trigger_within(self, share: float) -> float:
-        """Put an edge at a share (0..1) of the table's coming tick, and return the encoder's position at the edge."""
+        """Apply an edge at a fraction (0..1) of the coming tick, and return the encoder's position at the edge."""
         raise BenchError(f"the rig cannot trigger the table at {share:g} of a tick")
 
 
 class OnBench(Stand):
-    """A table with a bench, which does what it is told."""
+    """A table with a bench."""
 
     capabilities = frozenset({TRIGGER, POWER_CYCLE, PRESET})
 
@@ -74,7 +74,7 @@ class OnBench(Stand):
         self._bench = bench
 
     def trigger(self) -> None:
-        """Put one edge on the trigger input, now."""
+        """Apply one edge to the trigger input."""
         self._bench.trigger()
 
     def power_cycle(self) -> None:
@@ -87,7 +87,7 @@ class OnBench(Stand):
 
 
 class InProcess(OnBench):
-    """A simulated table behind a port of this process, whose time stands while it is looked at."""
+    """A simulated table behind a port of this process. Its time does not pass while it is observed."""
 
     capabilities = OnBench.capabilities | {OBSERVER}
 
@@ -96,11 +96,11 @@ class InProcess(OnBench):
         self._table = table
 
     def encoder_deg(self) -> float:
-        """Return the encoder's position now."""
+        """Return the position of the encoder now."""
         return self._table.status().encoder_deg
 
     def trigger_within(self, share: float) -> float:
-        """Put an edge at a share (0..1) of the coming tick, and return the encoder's position at the edge."""
+        """Apply an edge at a fraction (0..1) of the coming tick, and return the encoder's position at the edge."""
         before_deg = self.encoder_deg()
         self._table.trigger(share)
         if share:
@@ -109,10 +109,10 @@ class InProcess(OnBench):
 
 
 class Programs(Stand):
-    """Programs of the test bench that the profile names; each has done its deed when it ends with status 0.
+    """Programs of the test bench that the profile names. Status 0 means success.
 
     Raises:
-        BenchError: there is no such program here.
+        BenchError: a program was not found.
     """
 
     def __init__(
@@ -128,14 +128,14 @@ class Programs(Stand):
         self.capabilities = frozenset(capability for capability, command in named.items() if command)
         for key, command in ((_TRIGGER_KEY, trigger_command), (_POWER_CYCLE_KEY, power_cycle_command)):
             if command and which(command[0]) is None:
-                raise BenchError(f"{key}: there is no program {command[0]!r} here; give its path, or leave the key out")
+                raise BenchError(f"{key}: program not found: {command[0]!r}; give its path, or remove the key")
 
     def trigger(self) -> None:
-        """Run the trigger's program."""
+        """Run the program for the trigger."""
         self._run(_TRIGGER_KEY, self._trigger_command)
 
     def power_cycle(self) -> None:
-        """Run the power switch's program."""
+        """Run the program for the power switch."""
         self._run(_POWER_CYCLE_KEY, self._power_cycle_command)
 
     def _run(self, key: str, command: Sequence[str]) -> None:
@@ -147,7 +147,7 @@ class Programs(Stand):
 
 
 class RecordedStand(Stand):
-    """Another stand, whose deeds stand in the record of the wire."""
+    """Wraps another stand and records its actions with the wire."""
 
     def __init__(self, stand: Stand, note: Callable[[str], None]) -> None:
         self.capabilities, self.facts = stand.capabilities, stand.facts
@@ -155,7 +155,7 @@ class RecordedStand(Stand):
         self._note = note
 
     def trigger(self) -> None:
-        """Put one edge on the trigger input, now."""
+        """Apply one edge to the trigger input."""
         self._note("trigger")
         self._stand.trigger()
 
@@ -170,20 +170,20 @@ class RecordedStand(Stand):
         self._stand.preset(count)
 
     def encoder_deg(self) -> float:
-        """Return the encoder's position now, which is not recorded."""
+        """Return the position of the encoder now; this is not recorded."""
         return self._stand.encoder_deg()
 
     def trigger_within(self, share: float) -> float:
-        """Put an edge at a share (0..1) of the coming tick, and return the encoder's position at the edge."""
+        """Apply an edge at a fraction (0..1) of the coming tick, and return the encoder's position at the edge."""
         self._note("trigger")
         return self._stand.trigger_within(share)
 
 
 def stand_beside(port: Port, control: Path | None, profile: Profile) -> Stand:
-    """Return what can be done to the table at a port.
+    """Return the actions that are available for the table at a port.
 
     Raises:
-        BenchError: the control channel does not answer, or a program that the profile names is not there.
+        BenchError: the control channel does not reply, or a program that the profile names was not found.
     """
     if control is not None:
         return OnBench(ControlChannel(control))
@@ -194,14 +194,14 @@ def stand_beside(port: Port, control: Path | None, profile: Profile) -> Stand:
 
 
 def profile_of_the_table(stand: Stand, profile: Profile) -> Profile:
-    """Return the profile with what the rig can ask the table itself: how many counts its registers have to a degree."""
+    """Return the profile with what the rig can read from the table: the counts per degree of its registers."""
     if stand.facts is None:
         return profile
     return replace(profile, table=replace(profile.table, counts_per_deg=stand.facts.counts_per_deg))
 
 
 def capabilities(stand: Stand, profile: Profile) -> frozenset[str]:
-    """Return all that cases may need and that there is: of the rig, of the table, of this installation."""
+    """Return all available capabilities: of the rig, of the table, of this installation."""
     found = {ERROR_REPLIES if profile.serial.error_replies else STRICT}
     if profile.rig.sees_disconnect:
         found.add(DISCONNECT)

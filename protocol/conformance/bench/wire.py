@@ -1,4 +1,4 @@
-"""The port as lines and times, with a record of every byte that passed."""
+"""Read and write lines with their times, and record every byte."""
 
 from itertools import pairwise
 from typing import Literal, NamedTuple, Protocol
@@ -9,22 +9,22 @@ from protocol.port import Port
 CR = b"\r"
 
 _LONGEST_LINE = 256
-"""What comes without a CR is a line that goes on up to here, and no line beyond."""
+"""Bytes without a CR up to this limit are an incomplete line; beyond it they are not a line."""
 
 _FLOOD = 20_000
-"""More bytes than a table on any line says in answer to anything."""
+"""More bytes than any table sends in reply."""
 
 
 class ReopenablePort(Port, Protocol):
-    """A port of pyserial's, which can be opened again."""
+    """A pyserial port that can be opened again."""
 
     def open(self) -> None:
-        """Take the port."""
+        """Open the port."""
         ...
 
 
 class Event(NamedTuple):
-    """What passed at one time: the bytes of a write, a line received (at its first byte), or a deed beside the wire."""
+    """An event at one time: the bytes of a write, a received line (at its first byte), or an action of the rig."""
 
     time_s: float
     direction: Literal["sent", "received", "beside"]
@@ -32,12 +32,12 @@ class Event(NamedTuple):
 
 
 class RecordedPort:
-    """A port that keeps what passes through it.
+    """A port that records all traffic.
 
     Attributes:
         inner: the port itself.
-        clock: that of the port, simulated or real.
-        events: what passed, in order.
+        clock: the clock of the port, simulated or real.
+        events: the recorded traffic, in order.
     """
 
     def __init__(self, port: ReopenablePort) -> None:
@@ -47,7 +47,7 @@ class RecordedPort:
 
     @property
     def timeout(self) -> float | None:
-        """How long `read` waits, in seconds."""
+        """The maximum time that `read` waits, in seconds."""
         return self.inner.timeout
 
     @timeout.setter
@@ -56,11 +56,11 @@ class RecordedPort:
 
     @property
     def in_waiting(self) -> int:
-        """The number of bytes that can be read at once."""
+        """The number of bytes that can be read without waiting."""
         return self.inner.in_waiting
 
     def read(self, size: int, /) -> bytes:
-        """Return `size` bytes, or fewer when `timeout` has passed."""
+        """Return `size` bytes, or fewer after `timeout`."""
         data = self.inner.read(size)
         if data:
             last = self.events[-1] if self.events else None
@@ -76,20 +76,20 @@ class RecordedPort:
         return self.inner.write(data)
 
     def note(self, deed: str) -> None:
-        """Record what is done to the table beside the wire."""
+        """Record an action of the rig on the table."""
         self.events.append(Event(self.clock.now_s(), "beside", deed.encode()))
 
     def open(self) -> None:
-        """Take the port again."""
+        """Open the port again."""
         self.inner.open()
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
         self.inner.close()
 
 
 class Line(NamedTuple):
-    """A received line without its CR, the times of its first byte and of its CR, and the longest gap in it."""
+    """A received line without its CR, the times of its first byte and of its CR, and its longest gap."""
 
     text: bytes
     first_s: float
@@ -98,9 +98,9 @@ class Line(NamedTuple):
 
 
 class Wire:
-    """Sends bytes, and gathers lines with the times of their bytes.
+    """Sends bytes, and collects lines with the times of their bytes.
 
-    Bytes take `byte_s` each on their way to the table; what is waited for is waited for from the last of them on.
+    Each byte takes `byte_s` to reach the table. A wait for a reply starts when the last byte has arrived.
     """
 
     def __init__(self, port: RecordedPort, byte_s: float = 0.0) -> None:
@@ -112,7 +112,7 @@ class Wire:
         self._times: list[float] = []
 
     def send(self, data: bytes) -> float:
-        """Send bytes and return the time before the first of them."""
+        """Send bytes and return the time just before the first one."""
         now_s = self.clock.now_s()
         self._sent_s = max(self._sent_s, now_s) + len(data) * self._byte_s
         self.port.write(data)
@@ -131,16 +131,16 @@ class Wire:
         return Line(text, times[0], times[-1], max(gaps, default=0.0))
 
     def listen(self, duration_s: float) -> bytes:
-        """Return, and forget, all that has come and comes in this time."""
+        """Return and discard everything that was received or is received within this time."""
         deadline_s = self._from_now_s(duration_s)
         while (left_s := deadline_s - self.clock.now_s()) > 0.0:
             self._receive(left_s)
         return self.forget()
 
     def drain(self, quiet_s: float, patience_s: float) -> bytes:
-        """Return, and forget, all that comes until nothing has come for a while, or patience ends.
+        """Return and discard everything that is received until the line is silent for a while, or the patience is over.
 
-        A device that floods is not heard out.
+        A device that sends without end is not waited for.
         """
         deadline_s = self._from_now_s(patience_s)
         heard = b""
@@ -151,27 +151,27 @@ class Wire:
         return heard
 
     def forget(self) -> bytes:
-        """Return, and forget, what has been received and not been read as a line."""
+        """Return and discard the received bytes that were not read as a line."""
         heard = bytes(self._rest)
         self._rest.clear()
         self._times.clear()
         return heard
 
     def reopen(self) -> None:
-        """Leave the port and come back, as a new client does."""
+        """Close and open the port, as a new client does."""
         self.port.note("reopen")
         self.port.close()
         self.forget()
         self.port.open()
 
     def _from_now_s(self, duration_s: float) -> float:
-        """Return when a time is over that begins when all that was sent has arrived."""
+        """Return after a time that starts when all sent bytes have arrived."""
         return max(self._sent_s, self.clock.now_s()) + duration_s
 
     def _receive(self, timeout_s: float) -> bool:
-        """Wait for a byte, or look whether one is there when time is up; return False when none came.
+        """Wait for a byte. At the deadline, check once more whether one is available. Return False when there is none.
 
-        A busy machine may keep this program from a byte that was in time.
+        On a busy machine this program may see a byte late although it arrived in time.
         """
         self.port.timeout = max(timeout_s, 0.0)
         data = self.port.read(1)

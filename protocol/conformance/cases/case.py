@@ -1,4 +1,4 @@
-"""A case: one way to hold a table against one clause."""
+"""A case: one test of a table against one clause."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ class Case:
 
     Attributes:
         id: the clause's number, with a name after a colon where a clause has several cases.
-        clause: what the table is held against.
-        how: what the case does, in a sentence.
+        clause: the clause that the case tests.
+        how: what the case does, in one sentence.
         needs: the capabilities without which it is skipped.
-        travel_deg: how far a conformant table turns, each way from where the session began.
-        run: does it; raises `NonconformityError`.
+        travel_deg: how far a conforming table turns in each direction from the start of the session.
+        run: runs the case; raises `NonconformityError`.
     """
 
     id: str
@@ -34,11 +34,11 @@ class Case:
 
 
 CASES: dict[str, Case] = {}
-"""Every case by its id, as far as its file has been imported; `catalog` has them all."""
+"""Every registered case by its id. A case is registered when its file is imported; `catalog` has all cases."""
 
 
 def case(identifier: str, *needs: str, travel_deg: float = 0.0) -> Callable[[Run], Run]:
-    """Register a function as the case of a clause; its docstring says how it is done."""
+    """Register a function as a case of a clause. Its docstring describes the procedure."""
 
     def register(run: Run) -> Run:
         assert identifier not in CASES, identifier

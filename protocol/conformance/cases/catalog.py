@@ -1,4 +1,4 @@
-"""The catalog of all cases, and how some of them are chosen by their ids."""
+"""The catalog of all cases, and their selection by id."""
 
 import re
 from collections.abc import Sequence
@@ -13,24 +13,26 @@ def all_cases() -> list[Case]:
 
 
 def chosen_cases(prefixes: Sequence[str]) -> list[Case]:
-    """Return the cases whose id begins with one of the prefixes, numbers taken whole: `4.1/1` is not `4.1/10`.
+    """Return the cases whose id starts with one of the prefixes.
+
+    Numbers are compared as a whole: `4.1/1` does not match `4.1/10`.
 
     A prefix that ends in `$` is a whole id: `7.1/1$` is not `7.1/1:backwards`.
 
     Raises:
-        ValueError: a prefix chooses none.
+        ValueError: a prefix matches no case.
     """
     everything = all_cases()
     for prefix in prefixes:
         if not prefix:
-            raise ValueError("a prefix is empty; leave the option out for all cases")
+            raise ValueError("a prefix is empty; omit the option to run all cases")
         if not any(_begins(one.id, prefix) for one in everything):
-            raise ValueError(f"no case begins with {prefix}; --list shows all")
+            raise ValueError(f"no case id starts with {prefix}; --list shows all")
     return [one for one in everything if not prefixes or any(_begins(one.id, prefix) for prefix in prefixes)]
 
 
 def only(case: Case) -> str:
-    """Return the prefix that chooses this case and no other: its id, with `$` behind it where others begin so too."""
+    """Return the prefix that selects only this case: its id, with `$` at the end where another id starts with it."""
     return case.id if chosen_cases([case.id]) == [case] else f"{case.id}$"
 
 

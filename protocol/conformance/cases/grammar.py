@@ -14,12 +14,12 @@ _WRAPS = (
     *(2**bits for bits in (8, 15, 16, 23, 24, 31, 32, 48, 53, 63, 64, 80)),
     *(10**n for n in (3, 5, 9, 12, 20, 25)),
 )
-"""Where registers and buffers for the digits of a number may end."""
+"""Numbers of digits at which registers and buffers may end."""
 
 _LOW = Decimal("0.15")
-"""An S or an A that is a third lower with one decimal."""
+"""An S or an A that is a third lower when it is cut to one decimal place."""
 _SLOW_S, _RAMP_S = 4.7, 3.3
-"""In which such an S, or an A, makes a difference of a quarter of a degree."""
+"""The time in which this S, or A, makes a difference of a quarter of a degree."""
 
 _BAD_NUMBER = ErrorCode.BAD_NUMBER
 _OUT_OF_RANGE = ErrorCode.OUT_OF_RANGE
@@ -36,7 +36,7 @@ def a_letter_begins_a_line(rig: Rig) -> None:
 
 @case("4.1/2")
 def spaces_are_free(rig: Rig) -> None:
-    """Put spaces, or none, where they may stand."""
+    """Put spaces, or none, at all allowed places."""
     speed, rate = number(rig.profile.motion.speed_deg_s), number(rig.profile.motion.acceleration_deg_s2)
     for line in (b"S" + speed, b"A" + rate, b"R0", b"R-0", b"S   " + speed, b"S " + speed + b"   "):
         rig.expect(line)
@@ -45,7 +45,7 @@ def spaces_are_free(rig: Rig) -> None:
 
 @case("4.1/3")
 def a_reading_takes_no_number(rig: Rig) -> None:
-    """Send `H` and `L` with something behind."""
+    """Send `H` and `L` with text after the letter."""
     for line in (b"H 1", b"H0", b"HH", b"HOME", b"HELP", b"L x", b"L .", b"L0", b"LATCH"):
         rig.refused(line, _BAD_NUMBER)
 
@@ -60,12 +60,15 @@ def a_setting_takes_exactly_one_number(rig: Rig) -> None:
 
 @case("4.1/5", travel_deg=2)
 def a_number_may_have_a_sign(rig: Rig) -> None:
-    """Send `+` and `-` with all settings; the sign holds for what is below 1, and for whole part and decimals alike."""
+    """Send `+` and `-` with all settings.
+
+    The sign applies to values between -1 and 1, and to whole part and decimals alike.
+    """
     for letter, limit in ((b"S ", rig.profile.motion.speed_deg_s), (b"A ", rig.profile.motion.acceleration_deg_s2)):
         rig.expect(letter + b"+" + number(limit))
         rig.refused(letter + b"-0.25", _OUT_OF_RANGE)
     steps = [(b"R +2", 2.0), (b"R -2", 0.0), (b"R -0", 0.0), (b"R -0.5", -0.5), (b"R -1.5", -2.0), (b"R +1.5", -0.5)]
-    if rig.home_deg == 0:  # elsewhere these are far away
+    if rig.home_deg == 0:  # on other tables these targets are far away
         steps += [(b"P -1.5", -1.5), (b"P -0.5", -0.5), (b"P +0.5", 0.5), (b"P -0", 0.0)]
     for line, expected_deg in steps:
         rig.expect(line)
@@ -75,7 +78,7 @@ def a_number_may_have_a_sign(rig: Rig) -> None:
 
 @case("4.1/6")
 def a_point_has_digits_on_both_sides(rig: Rig) -> None:
-    """Send numbers that begin or end with the point."""
+    """Send numbers that start or end with the decimal point."""
     with rig.unmoved(b"a number with half a point"):
         for line in (b"P 5.", b"R .5", b"S 5.", b"A .5", b"R .", b"R -.5", b"R 1..5", b"R 1.2.3"):
             rig.refused(line, _BAD_NUMBER)
@@ -83,7 +86,7 @@ def a_point_has_digits_on_both_sides(rig: Rig) -> None:
 
 @case("4.1/7")
 def a_number_is_plain(rig: Rig) -> None:
-    """Send signs too many, exponents, names and separators."""
+    """Send numbers with too many signs, exponents, names and separators."""
     with rig.unmoved(b"a number that is none"):
         for text in (b"--5", b"+-5", b"5-", b"1e1", b"1e400", b"1E1", b"nan", b"inf", b"-inf", b"1,5", b"1_0", b"0x10"):
             rig.refused(b"R " + text, _BAD_NUMBER)
@@ -91,7 +94,7 @@ def a_number_is_plain(rig: Rig) -> None:
 
 @case("4.1/8", travel_deg=2)
 def all_decimals_count(rig: Rig) -> None:
-    """Move by increments and to positions of 2 to 25 irregular decimals; lead a number with zeros."""
+    """Move by increments and to positions with 2 to 25 irregular decimals. Add leading zeros to a number."""
     rig.expect(b"S " + number(rig.profile.motion.speed_deg_s).rjust(LINE_LIMIT - 2, b"0"))
     sign = 1
     for places in (2, 3, 4, 5, 8, 9, 10, 11, 12, 16, 17, 19, 20, 25):
@@ -105,7 +108,7 @@ def all_decimals_count(rig: Rig) -> None:
 
 @case("4.1/8:settings", travel_deg=3)
 def all_decimals_of_s_and_a_count(rig: Rig) -> None:
-    """Begin motions with an S, then with an A, that are much lower when a decimal is cut or does not fit a register."""
+    """Start motions with an S, then with an A, that is much lower when a decimal is cut or a register overflows."""
     rig.set_speed_text(_irregular(_LOW, 25))
     rig.move_by(3)
     rig.follow(_SLOW_S)
@@ -122,7 +125,7 @@ def all_decimals_of_s_and_a_count(rig: Rig) -> None:
 
 @case("4.1/8:whole", PRESET, travel_deg=2)
 def all_digits_of_the_whole_part_count(rig: Rig) -> None:
-    """Begin increments of 2^17 and -2^16 deg, and stop beyond what is left when the number wraps."""
+    """Start increments of 2^17 and -2^16 deg. Stop beyond the remainder that a register leaves when it wraps."""
     for whole in (2**17, -(2**16)):
         rig.stand.preset(0)
         rig.stand_afresh_at(0)
@@ -131,7 +134,10 @@ def all_digits_of_the_whole_part_count(rig: Rig) -> None:
 
 @case("4.1/9")
 def an_unusable_number_is_out_of_range(rig: Rig) -> None:
-    """Send numbers of good form that no table can use, among them those that a register of 8 to 80 bits would wrap."""
+    """Send well-formed numbers that no table can use.
+
+    Some of them wrap in a register of 8 to 80 bits.
+    """
     limits, range_deg = rig.profile.limits, rig.profile.range_deg
     with rig.unmoved(b"a number out of range"):
         for line in (b"P 99999999999999", b"P -99999999999999", b"R 9999999999999999999999999999", b"S 99999999999"):
@@ -149,7 +155,7 @@ def an_unusable_number_is_out_of_range(rig: Rig) -> None:
 
 @case("4.1/10", travel_deg=30)
 def a_refused_line_changes_nothing(rig: Rig) -> None:
-    """During a motion send refused lines of every kind; it ends as it began, and so does the next one."""
+    """Send refused lines of every kind during a motion. This motion and the next one end as commanded."""
     rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
     rig.move_to(15)
     rig.follow(0.1)
@@ -173,7 +179,7 @@ def a_refused_line_changes_nothing(rig: Rig) -> None:
 
 @case("4.1/11", travel_deg=30)
 def every_command_is_accepted_in_motion(rig: Rig) -> None:
-    """During a motion send each of the six commands."""
+    """Send each of the six commands during a motion."""
     speed, rate = rig.profile.motion.speed_deg_s / 4, rig.profile.motion.acceleration_deg_s2 / 4
     rig.settings(speed, rate)
     rig.move_to(15)
@@ -188,5 +194,5 @@ def every_command_is_accepted_in_motion(rig: Rig) -> None:
 
 
 def _irregular(value: Decimal, places: int) -> bytes:
-    """Return a number near a value, its decimals without a pattern."""
+    """Return a number near a value, with decimals that have no pattern."""
     return f"{value - Decimal(2).sqrt() / 1000 - Decimal(1) / 2**20:.{places}f}".encode()

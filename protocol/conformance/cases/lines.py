@@ -1,4 +1,4 @@
-"""Chapter 3: from bytes to lines."""
+"""Chapter 3: bytes and lines."""
 
 from protocol.conformance.bench.stand import DISCONNECT, ERROR_REPLIES
 from protocol.conformance.cases.case import case
@@ -8,12 +8,12 @@ from protocol.conformance.judgement.wire_checks import number
 from protocol.messages import LINE_LIMIT, ErrorCode
 
 _PAUSE_S = 6.0
-"""Longer than most time-outs after which a table may forget an incomplete line, or carry it out."""
+"""Longer than most timeouts after which a table might discard or execute an incomplete line."""
 
 
 @case("3.1/1")
 def a_line_ends_in_cr(rig: Rig) -> None:
-    """Send `H`: nothing; then CR: the reply."""
+    """Send `H`: no reply. Then send CR: the reply."""
     rig.wire.send(b"H")
     rig.silence("'H' without its CR")
     rig.wire.send(b"\r")
@@ -22,7 +22,10 @@ def a_line_ends_in_cr(rig: Rig) -> None:
 
 @case("3.1/2")
 def lf_is_ignored(rig: Rig) -> None:
-    """Put LF before, within and after commands, and within a number: the speed that it makes is above the limit."""
+    """Put LF before, within and after commands, and within a number.
+
+    Without the LF, that number is a speed above the limit.
+    """
     for line in (b"\nH", b"H\n", b"\n\nH\n\n"):
         rig.angle_in(rig.ask(line))
     rig.wire.send(b"H\r\nL\r\nH\n\r")
@@ -36,7 +39,7 @@ def lf_is_ignored(rig: Rig) -> None:
 
 @case("3.1/3")
 def an_empty_line_has_no_reply(rig: Rig) -> None:
-    """Send empty lines, of nothing, of spaces and of LF; then `H` has one reply."""
+    """Send empty lines: without bytes, with spaces, with LF. Then `H` has one reply."""
     rig.wire.send(b"\r\r  \r\n\r \n \r")
     rig.silence("empty lines")
     rig.read()
@@ -45,7 +48,7 @@ def an_empty_line_has_no_reply(rig: Rig) -> None:
 
 @case("3.1/4")
 def bytes_may_come_slowly(rig: Rig) -> None:
-    """Send a command byte by byte with pauses, two commands with the cut in mid-line, and one with a long pause."""
+    """Send a command byte by byte with pauses, two commands split within a line, and one command with a long pause."""
     line = b"S %s\r" % number(rig.profile.motion.speed_deg_s)
     for index in range(len(line)):
         rig.wire.send(line[index : index + 1])
@@ -58,7 +61,7 @@ def bytes_may_come_slowly(rig: Rig) -> None:
     rig.angle_in(rig.reply_to(b"L"), b"L")
     rig.wire.send(line[:-2])
     heard = rig.wire.listen(_PAUSE_S)
-    require(not heard, f"{line[:-2]!r}, and no CR for {_PAUSE_S:g} s, got {heard!r}")
+    require(not heard, f"{line[:-2]!r} without CR for {_PAUSE_S:g} s, got {heard!r}")
     rig.wire.send(line[-2:])
     got = rig.reply_to(line).text
     require(got == b"OK", f"{line!r}, with a pause of {_PAUSE_S:g} s in it, got {got!r}, not b'OK'")
@@ -66,7 +69,7 @@ def bytes_may_come_slowly(rig: Rig) -> None:
 
 @case("3.1/5", DISCONNECT)
 def a_half_line_goes_with_its_client(rig: Rig) -> None:
-    """Send half a command, close the port and open it again: the next line stands alone."""
+    """Send an incomplete command, close the port and open it again: the next line is read alone."""
     rig.wire.send(b"S 0")
     rig.wire.clock.sleep_s(0.02)
     rig.wire.reopen()
@@ -75,13 +78,13 @@ def a_half_line_goes_with_its_client(rig: Rig) -> None:
 
 @case("3.2/1")
 def a_line_of_full_length_is_accepted(rig: Rig) -> None:
-    """Send a command filled up with spaces to 32 bytes."""
+    """Send a command padded with spaces to 32 bytes."""
     rig.angle_in(rig.ask(b"H".ljust(LINE_LIMIT)))
 
 
 @case("3.2/2")
 def a_longer_line_is_refused(rig: Rig) -> None:
-    """Send lines of 33, of 257 (which a byte counts as 1) and of 500 bytes, 33 spaces, and a line in two pieces."""
+    """Send lines of 33, of 257 (1 in an 8-bit counter) and of 500 bytes, 33 spaces, and a line in two pieces."""
     for line in (b"H".ljust(LINE_LIMIT + 1), b"H" * 33, b"H".ljust(257), b"P".ljust(500), b" " * (LINE_LIMIT + 1)):
         rig.refused(line, ErrorCode.LINE_TOO_LONG)
     rig.wire.send(b"H".ljust(20))
@@ -92,7 +95,7 @@ def a_longer_line_is_refused(rig: Rig) -> None:
 
 @case("3.2/3")
 def a_bad_byte_spoils_its_line(rig: Rig) -> None:
-    """Send lines with bytes that are not printable ASCII, at every place."""
+    """Send lines with a byte that is not printable ASCII, at every position."""
     for byte in (0x00, 0x04, 0x08, 0x09, 0x11, 0x18, 0x1B, 0x1F, 0x7F, 0x80, 0xFF):
         rig.refused(bytes((byte,)) + b"H", ErrorCode.BAD_BYTE)
         rig.refused(b"H" + bytes((byte,)), ErrorCode.BAD_BYTE)
@@ -101,7 +104,7 @@ def a_bad_byte_spoils_its_line(rig: Rig) -> None:
 
 @case("3.2/4", ERROR_REPLIES)
 def the_first_fault_is_answered(rig: Rig) -> None:
-    """Send lines that are too long and hold a bad byte, before and behind the limit."""
+    """Send lines that are too long and contain a bad byte, before and after the length limit."""
     rig.refused(b"H\xff" + b" " * 40, ErrorCode.BAD_BYTE)
     rig.refused(b"H".ljust(40) + b"\xff", ErrorCode.LINE_TOO_LONG)
     rig.refused(b"x".ljust(31) + b"\x01" + b"y" * 40, ErrorCode.BAD_BYTE)
@@ -110,7 +113,7 @@ def the_first_fault_is_answered(rig: Rig) -> None:
 
 @case("3.2/5")
 def a_faulty_line_leaves_the_next_alone(rig: Rig) -> None:
-    """After each kind of fault, `H` is answered."""
+    """Send `H` after each kind of fault: it has its reply."""
     for line, code in (
         (b"\x00", ErrorCode.BAD_BYTE),
         (b"9" * 100, ErrorCode.LINE_TOO_LONG),

@@ -6,7 +6,7 @@ from protocol.conformance.judgement.rig import Rig
 
 @case("7.3/1", travel_deg=30)
 def a_new_target_replaces_the_old(rig: Rig) -> None:
-    """On the way to 30 be sent to a place much nearer, then on to 30 again."""
+    """On the way to 30, command a much nearer position, then 30 again."""
     _under_way(rig, 30)
     rig.move_to(10)
     rig.follow(0.5)
@@ -16,7 +16,7 @@ def a_new_target_replaces_the_old(rig: Rig) -> None:
 
 @case("7.3/2", travel_deg=40)
 def the_speed_does_not_step(rig: Rig) -> None:
-    """At top speed be sent farther, with another A: the speed goes on."""
+    """At full speed, command a farther position with another A: the speed continues."""
     _under_way(rig, 25)
     rig.set_acceleration(rig.rate_deg_s2 / 4)
     rig.move_to(40)
@@ -25,7 +25,10 @@ def the_speed_does_not_step(rig: Rig) -> None:
 
 @case("7.3/2:accelerating", travel_deg=40)
 def the_speed_does_not_step_while_it_grows(rig: Rig) -> None:
-    """While the table accelerates be sent a little farther, fifteen times: each time speed and position go on."""
+    """During acceleration, command a slightly farther position, fifteen times.
+
+    Speed and position continue each time.
+    """
     top = rig.profile.motion.speed_deg_s
     rig.settings(top, min(rig.profile.motion.acceleration_deg_s2 / 2, top / (20 * rig.reading_s)))
     rig.move_to(30)
@@ -37,7 +40,7 @@ def the_speed_does_not_step_while_it_grows(rig: Rig) -> None:
 
 @case("7.3/3:behind", travel_deg=30)
 def a_target_behind(rig: Rig) -> None:
-    """At speed be sent back to the start."""
+    """At speed, command the start position."""
     _under_way(rig, 30)
     rig.move_to(0)
     rig.finish()
@@ -45,7 +48,7 @@ def a_target_behind(rig: Rig) -> None:
 
 @case("7.3/3:near", travel_deg=30)
 def a_target_nearer_than_the_braking_distance(rig: Rig) -> None:
-    """At speed be sent to a place just ahead: overshoot, and come back."""
+    """At speed, command a position just ahead: the table overshoots and returns."""
     rate = _under_way(rig, 30)
     position, speed = rig.reference_at(rig.wire.clock.now_s())
     rig.move_to(round(position - rig.home_deg + 0.3 * speed**2 / (2 * rate), 1))
@@ -54,7 +57,7 @@ def a_target_nearer_than_the_braking_distance(rig: Rig) -> None:
 
 @case("7.3/3:reversal", travel_deg=20)
 def reversals(rig: Rig) -> None:
-    """Be sent to and fro, twice before the first motion is over."""
+    """Command a reversal twice before the first motion ends."""
     _under_way(rig, 20)
     rig.move_to(-10)
     rig.follow(1.2)
@@ -64,7 +67,7 @@ def reversals(rig: Rig) -> None:
 
 @case("7.3/4", travel_deg=30)
 def a_lower_speed(rig: Rig) -> None:
-    """At speed be given half of it: the table decelerates at A."""
+    """At speed, command half of that speed: the table decelerates at A."""
     _under_way(rig, 30)
     rig.set_speed(rig.top_deg_s / 2)
     rig.move_to(30)
@@ -73,7 +76,7 @@ def a_lower_speed(rig: Rig) -> None:
 
 @case("7.3/4:higher", travel_deg=30)
 def a_higher_speed(rig: Rig) -> None:
-    """At speed be given twice of it: the table accelerates at A."""
+    """At speed, command twice that speed: the table accelerates at A."""
     _under_way(rig, 30)
     rig.set_speed(rig.top_deg_s * 2)
     rig.move_to(30)
@@ -82,7 +85,7 @@ def a_higher_speed(rig: Rig) -> None:
 
 @case("7.3/5", travel_deg=30)
 def a_higher_acceleration(rig: Rig) -> None:
-    """While accelerating be given a higher A."""
+    """During acceleration, command a higher A."""
     _under_way(rig, 30)
     rig.set_acceleration(rig.rate_deg_s2 * 2)
     rig.move_to(30)
@@ -91,7 +94,7 @@ def a_higher_acceleration(rig: Rig) -> None:
 
 @case("7.3/5:lower", travel_deg=40)
 def a_lower_acceleration(rig: Rig) -> None:
-    """Near the target be given an A with which the table cannot stop in time: overshoot, and come back."""
+    """Near the target, command an A that is too low for a stop in time: the table overshoots and returns."""
     _under_way(rig, 15)
     rig.set_acceleration(rig.rate_deg_s2 / 5)
     rig.move_to(15)
@@ -100,7 +103,7 @@ def a_lower_acceleration(rig: Rig) -> None:
 
 @case("7.3/6", travel_deg=20)
 def the_same_target_again(rig: Rig) -> None:
-    """While the table moves, send the same `P` ten times."""
+    """Send the same `P` ten times during the motion."""
     _under_way(rig, 20)
     for _ in range(10):
         rig.expect(b"P %d" % (rig.home_deg + 20))
@@ -110,7 +113,7 @@ def the_same_target_again(rig: Rig) -> None:
 
 @case("7.3/7", travel_deg=30)
 def the_last_of_a_burst_decides(rig: Rig) -> None:
-    """Send eight targets one after the other without a pause, drawn by chance, then a ninth."""
+    """Send eight random targets one after the other without a pause, then a ninth."""
     _under_way(rig, 10)
     for _ in range(8):
         rig.move_to(rig.chance.randrange(-10, 20))
@@ -120,7 +123,7 @@ def the_last_of_a_burst_decides(rig: Rig) -> None:
 
 @case("7.3/3:stop", travel_deg=30)
 def r_0_brakes_and_returns(rig: Rig) -> None:
-    """At speed send `R 0`."""
+    """Send `R 0` at speed."""
     _under_way(rig, 30)
     rig.move_by(0)
     rig.finish()

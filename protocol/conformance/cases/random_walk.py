@@ -1,7 +1,7 @@
-"""Random walks through the protocol, beside a model of the registers: what no list of cases would think of.
+"""Random walks through the protocol, compared with a model of the registers. They find sequences that nobody listed.
 
-On a simulated table a failing walk is shrunk where it was found. A real table is not made to repeat it: the walk is
-drawn again from its seed on the emulator, and shrunk there.
+On a simulated table, a failing walk is shrunk on that table. A real table does not repeat it: the walk is drawn again
+from its seed on the emulator, and shrunk there.
 """
 
 from collections.abc import Callable
@@ -19,19 +19,20 @@ from protocol.conformance.judgement.rig import Rig
 from protocol.conformance.judgement.verdict import NonconformityError
 
 ON_A_PORT, SIMULATED = (4, 12), (12, 20)
-"""Walks, and steps of each: a table that is moved for it is moved little."""
+"""The number of walks, and of steps in each. A real table makes fewer moves."""
 _STAND_IN_URL = "emulator://"
 
 
 class _FoundError(BaseException):
-    """Carries a failure past hypothesis, which would have a real table repeat it."""
+    """Carries a failure past hypothesis, which would make a real table repeat it."""
 
 
 def walk(rig: Rig) -> None:
-    """Walk at random on the rig's table.
+    """Run random walks on the rig's table.
 
     Raises:
-        NonconformityError: the table left the model; the message ends with the steps, the fewest that were found.
+        NonconformityError: the table contradicts the model. The message ends with the shortest sequence of steps that
+            was found.
     """
     chance = rig.chance.randrange(2**32)
     if is_simulated(rig.wire.port.inner):
@@ -40,28 +41,28 @@ def walk(rig: Rig) -> None:
     try:
         search(rig, chance, ON_A_PORT, _FoundError)
     except _FoundError as found:
-        raise NonconformityError(f"{found}; {_on_the_stand_in(rig, chance)}") from None
+        raise NonconformityError(f"{found}; {_on_the_emulator(rig, chance)}") from None
 
 
-def _on_the_stand_in(rig: Rig, chance: int) -> str:
-    """Return what the emulator does on the same walks."""
+def _on_the_emulator(rig: Rig, chance: int) -> str:
+    """Return the result of the same walks on the emulator."""
     try:
         port = open_port(_STAND_IN_URL, rig.profile)
     except SessionError:
-        return "there is no emulator here on which to shrink it"
+        return "not shrunk: the emulator is not installed"
     stand = stand_beside(port, None, rig.profile)
     twin = Rig(Wire(RecordedPort(port), rig.profile.byte_s), rig.profile, stand, 0, Random(0))  # noqa: S311  # not used
     try:
         _search_and_shrink(twin, chance, ON_A_PORT)
     except NonconformityError as error:
-        return f"on the emulator too: {error}"
+        return f"the emulator fails too: {error}"
     finally:
         port.close()
-    return "the emulator walks the same way without fault"
+    return "the emulator passes the same walk"
 
 
 def _search_and_shrink(rig: Rig, chance: int, size: tuple[int, int]) -> None:
-    """Raise the shortest failing walk; a table that fails now and then leaves the shortest that it failed."""
+    """Raise the shortest failing walk. A table that fails only sometimes gives the shortest failure that occurred."""
     failures: list[str] = []
 
     def failure(message: str) -> NonconformityError:
@@ -79,7 +80,7 @@ def _search_and_shrink(rig: Rig, chance: int, size: tuple[int, int]) -> None:
 def search(
     rig: Rig, chance: int, size: tuple[int, int], failure: Callable[[str], BaseException], *phases: Phase
 ) -> None:
-    """Walk so often, and so many steps each time, drawn from a seed; raise the first `failure`, or shrink it first."""
+    """Run the given number of walks and steps, drawn from a seed. Raise the first `failure`, or shrink it before."""
     walks, steps = size
     machine = type("RandomWalkOfOneRig", (RandomWalk,), {"rig": rig, "failure": staticmethod(failure)})
     run_state_machine_as_test(

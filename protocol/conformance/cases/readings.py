@@ -8,14 +8,14 @@ from protocol.conformance.judgement.verdict import require
 
 @case("4.2/1", travel_deg=10)
 def h_reads_the_position(rig: Rig) -> None:
-    """Move, and read where the table is."""
+    """Move, and read the position."""
     rig.move_to(10)
     rig.finish()
 
 
 @case("4.2/2", travel_deg=40)
 def a_position_is_of_the_time_of_its_reply(rig: Rig) -> None:
-    """At constant speed read again and again: each step of the position is as long as the time between its readings."""
+    """Read repeatedly at constant speed: each step of the position fits the time between its readings."""
     allowed = rig.profile.motion
     speed = min(allowed.speed_deg_s / 2, 40 / (20 * rig.reading_s), cruising_speed(40, allowed.acceleration_deg_s2))
     rig.settings(speed, allowed.acceleration_deg_s2)
@@ -24,7 +24,7 @@ def a_position_is_of_the_time_of_its_reply(rig: Rig) -> None:
     rig.follow(begin_s)
     began_s, duration_s = rig.motion.expectations[-1].began_s, rig.motion.expectations[-1].motion.duration_s
     rig.follow(duration_s - 2 * begin_s)
-    # A register that is read only now and then gives the same position twice, then a jump.
+    # A register that is updated only sometimes gives the same position twice, then a jump.
     steps = zip(rig.motion.samples, rig.motion.samples[1:], strict=False)
     slowing_s = duration_s - speed / rig.rate_deg_s2
     cruising = [(one, two) for one, two in steps if begin_s < one.time_s - began_s and two.time_s - began_s < slowing_s]
@@ -34,13 +34,13 @@ def a_position_is_of_the_time_of_its_reply(rig: Rig) -> None:
         for one, two in cruising
     )
     allowed_deg = rig.profile.step_deg + 0.1 * speed * 0.1
-    rig.measure("step of the position, beyond its time", max(worst_deg, 0.0), "deg", most=allowed_deg)
+    rig.measure("step of the position minus speed times time", max(worst_deg, 0.0), "deg", most=allowed_deg)
     rig.finish()
 
 
 @case("4.2/3", travel_deg=370)
 def the_position_is_unwrapped(rig: Rig) -> None:
-    """Turn by one turn and 10 degrees, there and back."""
+    """Turn by one turn and 10 degrees, then back."""
     rig.settings(rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2)
     for target in (370, 0):
         rig.move_to(target)
@@ -49,7 +49,7 @@ def the_position_is_unwrapped(rig: Rig) -> None:
 
 @case("4.2/4", travel_deg=10)
 def reading_changes_nothing(rig: Rig) -> None:
-    """Read both registers again and again, in a motion and at rest: neither the motion nor the latch heeds it."""
+    """Read both registers repeatedly, in a motion and at rest: reading does not change motion or latch."""
     latched = rig.read(b"L")
     rig.move_to(10)
     for _ in range(10):
@@ -59,7 +59,7 @@ def reading_changes_nothing(rig: Rig) -> None:
     resting = rig.read()
     for letter, value in ((b"H", resting), (b"L", latched)) * 10:
         got = rig.read(letter)
-        require(got == value, f"{letter!r} went from {value} to {got} deg while both were only read")
+        require(got == value, f"{letter!r} went from {value} to {got} deg although both were only read")
 
 
 @case("4.3/1")

@@ -1,4 +1,4 @@
-"""Chapter 8: what a client relies on to find its place again."""
+"""Chapter 8: the rules that let a client resynchronize."""
 
 from protocol.client import TableClient
 from protocol.conformance.bench.stand import ERROR_REPLIES
@@ -12,7 +12,7 @@ from protocol.messages import ErrorCode
 
 @case("8.1/1")
 def a_client_may_have_64_bytes_unanswered(rig: Rig) -> None:
-    """Send 64 bytes of `H` and `L` in turn; each has its reply, in order."""
+    """Send 64 bytes of `H` and `L` in turn. Each has its reply, in order."""
     rig.wire.send(b"H\rL\r" * 16)
     for letter in (b"H", b"L") * 16:
         rig.angle_in(rig.reply_to(letter), letter)
@@ -20,7 +20,7 @@ def a_client_may_have_64_bytes_unanswered(rig: Rig) -> None:
 
 @case("8.3/1", ERROR_REPLIES)
 def cancel_ends_a_half_line(rig: Rig) -> None:
-    """Leave half a motion command, send CAN and CR, and ask: the half line is not carried out."""
+    """Send an incomplete motion command, CAN and CR, and read the position: the incomplete line is not executed."""
     with rig.unmoved(b"R 5 and CAN"):
         rig.wire.send(b"R 5")
         rig.refused(b"\x18", ErrorCode.BAD_BYTE)
@@ -28,7 +28,10 @@ def cancel_ends_a_half_line(rig: Rig) -> None:
 
 @case("8.3/2", travel_deg=20)
 def late_replies_are_told_apart(rig: Rig) -> None:
-    """In a motion leave two replies unread, as one that came before may; the client reads where the table is now."""
+    """Leave two replies unread during a motion, as an earlier client may.
+
+    The client then reads the present position.
+    """
     rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
     rig.move_to(20)
     rig.follow(0.5)
@@ -39,7 +42,7 @@ def late_replies_are_told_apart(rig: Rig) -> None:
 
 @case("8.3/3", ERROR_REPLIES)
 def a_client_finds_its_place_after_noise(rig: Rig) -> None:
-    """Send noise without CAN or CR, and let the client find its place by the rules of 8.3."""
+    """Send noise without CAN or CR. The client resynchronizes by the rules of 8.3."""
     rig.wire.send(bytes(rig.chance.randrange(0x80, 0x100) for _ in range(20)))
     position = _client_reads(rig)
     own = rig.read()
@@ -48,7 +51,7 @@ def a_client_finds_its_place_after_noise(rig: Rig) -> None:
 
 @case("8.3/4", travel_deg=20)
 def a_stop_is_heard_at_once(rig: Rig) -> None:
-    """During a motion leave replies unread and send CAN, CR and `R 0`: the table stops, and comes back."""
+    """Leave replies unread during a motion, and send CAN, CR and `R 0`: the table stops and returns."""
     rig.settings(min(rig.profile.motion.speed_deg_s / 2, 4), rig.profile.motion.acceleration_deg_s2 / 2)
     rig.move_to(20)
     rig.follow(0.5)
@@ -56,19 +59,19 @@ def a_stop_is_heard_at_once(rig: Rig) -> None:
     rig.wire.send(b"\x18\rR 0\r")
     rig.drain()
     stopped = float(rig.wait_for_rest()) - rig.home_deg
-    rig.measure("where R 0 brought it to rest", stopped, "deg", most=15)
+    rig.measure("after R 0", stopped, "deg", most=15)
 
 
 def _client_reads(rig: Rig) -> float:
-    """Return what a client reads, as anybody would use it; in a motion it is held against the trapezoid."""
+    """Return the position that a client reads. During a motion it is compared with the trapezoid."""
     client = TableClient(rig.wire.port, rig.profile.serial.timeout_s)
     try:
         position = client.position_deg()
     except (ReplyTimeout, UnexpectedReply) as error:
-        raise NonconformityError(f"the client does not find its place: {error}") from error
+        raise NonconformityError(f"the client does not resynchronize: {error}") from error
     asked_s = next(event.time_s for event in reversed(rig.wire.port.events) if event.direction == "sent")
     heard_s = rig.wire.clock.now_s()
     if rig.motion.expectations:
         rig.motion.samples.append(Sample((asked_s + heard_s) / 2, position, (heard_s - asked_s) / 2))
-    rig.silence("after the client had found its place the line")
+    rig.silence("after the client resynchronized, the line")
     return position

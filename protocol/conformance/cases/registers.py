@@ -9,14 +9,14 @@ from protocol.conformance.judgement.verdict import require
 from protocol.conformance.judgement.wire_checks import number
 
 _ODD_SHARE = 0.9371
-"""Of the full speed: a reading's last decimal and a tick's way have no common measure then."""
+"""Share of the full speed at which the resolution of a reading and the travel of a tick have no common measure."""
 _LESS_THAN_A_TICK_S = 1e-6
-"""To wait for so long takes one tick of a simulated table."""
+"""A wait of this length takes one tick of a simulated table."""
 
 
 @case("6.1/1", TRIGGER, travel_deg=10)
 def position_and_latch_are_two_registers(rig: Rig) -> None:
-    """Latch, then move: the position follows the motion, the latch does not."""
+    """Latch, then move: the position follows the motion, the latch stays."""
     rig.stand.trigger()
     latched = rig.read(b"L")
     rig.move_to(10)
@@ -27,7 +27,7 @@ def position_and_latch_are_two_registers(rig: Rig) -> None:
 
 @case("6.1/2", PRESET, travel_deg=5)
 def a_position_is_exact_at_both_ends(rig: Rig) -> None:
-    """Preset the counter near each of its ends, and move to a position nearer still."""
+    """Preset the counter near each of its limits, and move to a position that is nearer still."""
     last = rig.profile.range_deg
     for begin, target in ((last - 5, last - 1.7), (5 - last, 1.7 - last)):
         rig.stand.preset(round(begin * rig.profile.table.counts_per_deg))
@@ -39,7 +39,7 @@ def a_position_is_exact_at_both_ends(rig: Rig) -> None:
 
 @case("6.1/3", PRESET, travel_deg=10)
 def a_register_runs_over_its_end(rig: Rig) -> None:
-    """Preset the counter just below its end, move over it and back: the motion is as anywhere else."""
+    """Preset the counter just below its limit, move past it and back: the motion is the same as elsewhere."""
     top = rig.profile.range_deg
     rig.stand.preset(2**31 - round(5 * rig.profile.table.counts_per_deg))
     rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
@@ -52,12 +52,12 @@ def a_register_runs_over_its_end(rig: Rig) -> None:
         error = float(rig.read()) - expected
         rig.measure(f"after R {way}, from {expected:.1f}", error, "deg", -allowed, allowed)
     rig.motion.samples[:] = [one._replace(position_deg=one.position_deg % (2 * top)) for one in rig.motion.samples]
-    rig.check_tracking("over the end and back")
+    rig.check_tracking("past the limit and back")
 
 
 @case("6.1/4", travel_deg=200)
 def the_table_turns_both_ways(rig: Rig) -> None:
-    """Move by more than half a turn forwards, and by more than half a turn backwards."""
+    """Move by more than half a turn forward, and by more than half a turn backward."""
     rig.settings(rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2)
     for target in (200, 0):
         rig.move_to(target)
@@ -66,7 +66,7 @@ def the_table_turns_both_ways(rig: Rig) -> None:
 
 @case("6.1/5", POWER_CYCLE, travel_deg=5)
 def registers_are_0_at_power_on(rig: Rig) -> None:
-    """Move, latch where the rig can, switch the table off and on, and read both registers."""
+    """Move, latch if the rig can, switch the table off and on, and read both registers."""
     rig.move_to(5)
     rig.finish()
     if TRIGGER in rig.stand.capabilities:
@@ -79,7 +79,10 @@ def registers_are_0_at_power_on(rig: Rig) -> None:
 
 @case("6.2/1", TRIGGER, travel_deg=40)
 def a_trigger_latches_the_position(rig: Rig) -> None:
-    """At speed, there and back, trigger between two readings, amid commands and replies too: the latch lies between."""
+    """At speed in both directions, trigger between two readings, also during commands and replies.
+
+    The latch lies between the readings.
+    """
     speed = rig.profile.motion.speed_deg_s / 2
     rig.settings(speed, rig.profile.motion.acceleration_deg_s2)
     worst_deg = 0.0
@@ -98,7 +101,7 @@ def a_trigger_latches_the_position(rig: Rig) -> None:
 
 @case("6.2/1:instant", OBSERVER, travel_deg=40)
 def a_trigger_latches_the_very_instant(rig: Rig) -> None:
-    """At full speed trigger twice, within ticks, and where the counter goes over 0: the latch is as the encoder."""
+    """At full speed, trigger twice within ticks, and where the counter passes 0: the latch equals the encoder."""
     rig.set_speed(_ODD_SHARE * rig.top_deg_s)
     for target in (40, 0):
         rig.move_to(target)
@@ -121,7 +124,10 @@ def a_trigger_latches_the_very_instant(rig: Rig) -> None:
 
 @case("6.2/2", TRIGGER, travel_deg=20)
 def each_trigger_overwrites_the_latch(rig: Rig) -> None:
-    """Latch at three places, with two triggers before each is read; then twice within two readings, in motion."""
+    """Latch at three positions, with two triggers before each reading.
+
+    Then latch twice between two readings, in motion.
+    """
     for turn, target in enumerate((10, 20, 0)):
         rig.stand.trigger()
         rig.move_to(target)
@@ -129,7 +135,7 @@ def each_trigger_overwrites_the_latch(rig: Rig) -> None:
         _TRIGGERS[turn + 1](rig)
         error = float(rig.read(b"L") - rig.read())
         rig.measure(
-            f"latch at {target}, from the position",
+            f"latch at {target} minus position",
             error,
             "deg",
             -rig.profile.resolution_deg,
@@ -161,7 +167,7 @@ def the_latch_holds_the_position_at_power_on(rig: Rig) -> None:
 
 @case("6.2/3", TRIGGER, travel_deg=20)
 def a_trigger_disturbs_nothing(rig: Rig) -> None:
-    """Trigger again and again in a motion, in the midst of replies too."""
+    """Trigger repeatedly during a motion, during replies too."""
     rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
     rig.move_to(20)
     for _ in range(20):
@@ -181,7 +187,7 @@ def _trigger_amid_a_command(rig: Rig) -> None:
 
 
 def _trigger_amid_a_reply(rig: Rig) -> None:
-    """Trigger while a reply, and nothing else, is on the line."""
+    """Trigger while only a reply is on the line."""
     rig.wire.send(b"H\r")
     rig.wire.clock.sleep_s(5 * rig.profile.byte_s)
     rig.stand.trigger()
@@ -201,7 +207,7 @@ _TRIGGERS = (lambda rig: rig.stand.trigger(), _trigger_amid_a_command, _trigger_
 
 
 def _step_to_the_tick_over_0(rig: Rig) -> None:
-    """Let time pass until the encoder's count changes its sign within the next tick."""
+    """Advance the time until the encoder's count changes its sign within the next tick."""
     last_deg = rig.stand.encoder_deg()
     deadline_s = rig.wire.clock.now_s() + 10
     while rig.wire.clock.now_s() < deadline_s:
@@ -214,7 +220,7 @@ def _step_to_the_tick_over_0(rig: Rig) -> None:
 
 
 def _require_latched(rig: Rig, angle_deg: float) -> None:
-    """Require that the latch reads as an angle, to within one count of the encoder."""
+    """Require that the latch holds an angle, to within one count of the encoder."""
     unit, count_deg = Decimal(1).scaleb(-rig.profile.serial.decimals), 1 / rig.profile.table.counts_per_deg
     low, high = (Decimal(angle_deg + way * count_deg * 1.001).quantize(unit, ROUND_HALF_EVEN) for way in (-1, 1))
     latched = rig.read(b"L")

@@ -10,12 +10,12 @@ from protocol.conformance.judgement.wire_checks import number
 from protocol.messages import ErrorCode
 
 _KINDS = (b"H ", b"L ", b"OK", b"OK", b"H ", b"OK", b"L ", b"H ", b"ERR 3 ", b"ERR 1 ")
-"""How the replies to the ten lines of `_mixed` begin."""
+"""The first bytes of the replies to the ten lines of `_mixed`."""
 
 
 @case("5.1/1", ERROR_REPLIES)
 def each_line_has_one_reply(rig: Rig) -> None:
-    """Send ten lines of every kind one by one; each has one reply, and nothing follows it."""
+    """Send ten lines of every kind, one by one. Each has one reply, and nothing follows it."""
     for line in _mixed(rig):
         rig.ask(line)
     rig.silence("after ten replies the line")
@@ -23,7 +23,7 @@ def each_line_has_one_reply(rig: Rig) -> None:
 
 @case("5.1/2", ERROR_REPLIES)
 def replies_come_in_order(rig: Rig) -> None:
-    """Send ten lines of every kind at once, three times; the replies are of the right kinds in the right order."""
+    """Send ten lines of every kind at once, three times. The replies have the right kinds and the right order."""
     lines = _mixed(rig)
     for _ in range(3):
         rig.wire.send(b"\r".join(lines) + b"\r")
@@ -34,7 +34,7 @@ def replies_come_in_order(rig: Rig) -> None:
 
 @case("5.1/2:motion", travel_deg=20)
 def replies_come_in_order_in_motion(rig: Rig) -> None:
-    """While the table moves, send readings of both registers at once, three times; the position only grows."""
+    """During a motion, send readings of both registers at once, three times. The position only increases."""
     rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2)
     rig.move_to(20)
     rig.follow(0.2)
@@ -51,7 +51,7 @@ def replies_come_in_order_in_motion(rig: Rig) -> None:
 
 @case("5.1/3", travel_deg=10)
 def nothing_else_is_sent(rig: Rig) -> None:
-    """Move without a question: the line stays silent, at the end of the motion too."""
+    """Move without reading: the line stays silent, at the end of the motion too."""
     rig.move_to(10)
     duration_s = rig.motion.expectations[-1].motion.duration_s
     heard = rig.wire.listen(duration_s + 0.3)
@@ -70,7 +70,7 @@ def a_reply_ends_in_cr_alone(rig: Rig) -> None:
 
 @case("5.2/1")
 def an_angle_has_its_form(rig: Rig) -> None:
-    """Read both registers; the form is checked to the byte."""
+    """Read both registers; the form of the reply is checked byte by byte."""
     rig.read(b"H")
     rig.read(b"L")
 
@@ -94,7 +94,7 @@ def an_angle_has_its_decimals(rig: Rig) -> None:
 
 @case("5.2/3", PRESET)
 def an_angle_is_rounded(rig: Rig) -> None:
-    """Preset the counter to values whose angles must be rounded up and down, both signs."""
+    """Preset the counter to values whose angles must be rounded up and down, of both signs."""
     count_deg = rig.profile.table.counts_per_deg
     for share in (0.3, 0.49, 0.51, 0.9, 7.26, 123.74):
         for sign in (1, -1):
@@ -103,10 +103,10 @@ def an_angle_is_rounded(rig: Rig) -> None:
 
 @case("5.2/4", PRESET)
 def halves_go_to_the_even_digit(rig: Rig) -> None:
-    """Preset the counter to angles that lie just between two readings."""
+    """Preset the counter to angles exactly between two readings."""
     unit = Decimal(1).scaleb(-rig.profile.serial.decimals)
     count_deg = Decimal(repr(rig.profile.table.counts_per_deg))
-    # The fifth of these is 0.25 deg on the default table, which must read 0.2.
+    # The fifth of these is 0.25 deg on the default table, which must be reported as 0.2.
     halves = [(2 * k + 1) * unit / 2 * count_deg for k in range(200)]
     exact = [int(half) for half in halves if half == int(half)][:4]
     if not exact:
@@ -118,7 +118,7 @@ def halves_go_to_the_even_digit(rig: Rig) -> None:
 
 @case("5.2/5", PRESET)
 def zero_has_no_sign(rig: Rig) -> None:
-    """Preset the counter to values just below 0, which round to it."""
+    """Preset the counter to values just below 0 that round to 0."""
     half = rig.profile.resolution_deg / 2 * rig.profile.table.counts_per_deg
     for count in {-1, -int(half * 0.5), -int(half * 0.9), 0}:
         _expect_rounded(rig, count)
@@ -126,7 +126,7 @@ def zero_has_no_sign(rig: Rig) -> None:
 
 @case("5.2/5:motion", travel_deg=2)
 def zero_has_no_sign_after_a_motion(rig: Rig) -> None:
-    """Come to 0 from both sides, where home is 0; the readings on the way count too."""
+    """Approach 0 from both sides, if the start position is 0. Readings during the motion count too."""
     if rig.home_deg != 0:
         raise InapplicableError(f"the session began at {rig.home_deg} deg, not at 0")
     for target in (-0.02, 0.0, -1.0, 0.0, 0.02, -0.03):
@@ -146,31 +146,31 @@ def an_angle_has_nothing_needless(rig: Rig) -> None:
 
 @case("5.3/1", ERROR_REPLIES)
 def unknown_command_is_1(rig: Rig) -> None:
-    """Require the words too."""
+    """Require the text of the error too."""
     _expect_words(rig, b"?", ErrorCode.UNKNOWN_COMMAND)
 
 
 @case("5.3/2", ERROR_REPLIES)
 def bad_number_is_2(rig: Rig) -> None:
-    """Require the words too."""
+    """Require the text of the error too."""
     _expect_words(rig, b"R x", ErrorCode.BAD_NUMBER)
 
 
 @case("5.3/3", ERROR_REPLIES)
 def out_of_range_is_3(rig: Rig) -> None:
-    """Require the words too."""
+    """Require the text of the error too."""
     _expect_words(rig, b"S 0", ErrorCode.OUT_OF_RANGE)
 
 
 @case("5.3/4", ERROR_REPLIES)
 def line_too_long_is_4(rig: Rig) -> None:
-    """Require the words too."""
+    """Require the text of the error too."""
     _expect_words(rig, b" " * 33, ErrorCode.LINE_TOO_LONG)
 
 
 @case("5.3/5", ERROR_REPLIES)
 def bad_byte_is_5(rig: Rig) -> None:
-    """Require the words too."""
+    """Require the text of the error too."""
     _expect_words(rig, b"\xff", ErrorCode.BAD_BYTE)
 
 
@@ -184,7 +184,7 @@ def a_strict_table_refuses_in_silence(rig: Rig) -> None:
 
 @case("5.4/2", STRICT)
 def a_strict_table_answers_all_else(rig: Rig) -> None:
-    """Mix refused lines with others; the others are answered in order."""
+    """Mix refused lines with others. The others have their replies in order."""
     speed, _ = _settings(rig)
     rig.wire.send(b"H\r?\r%s\rS 0\rL\rR x\rR 0\r" % speed)
     for line, kind in ((b"H", b"H "), (speed, b"OK"), (b"L", b"L "), (b"R 0", b"OK")):
@@ -195,13 +195,13 @@ def a_strict_table_answers_all_else(rig: Rig) -> None:
 
 
 def _settings(rig: Rig) -> tuple[bytes, bytes]:
-    """Return lines that set S and A to what the profile allows."""
+    """Return lines that set S and A to the values that the profile allows."""
     allowed = rig.profile.motion
     return b"S " + number(allowed.speed_deg_s), b"A " + number(allowed.acceleration_deg_s2)
 
 
 def _mixed(rig: Rig) -> tuple[bytes, ...]:
-    """Return ten lines of which each has a reply of its own kind; with their CR they fit the least buffer."""
+    """Return ten lines, each with its own kind of reply. With their CR they fit the minimum buffer."""
     return (b"H", b"L", *_settings(rig), b"H", b"R 0", b"L", b"H", b"S 0", b"?")
 
 
@@ -210,11 +210,11 @@ def _expect_words(rig: Rig, line: bytes, code: ErrorCode) -> None:
 
 
 def _expect_rounded(rig: Rig, count: int) -> None:
-    """Preset the counter, and with it the latch, and require the readings that rounding to the even digit gives."""
+    """Preset the counter, and with it the latch. Require readings that are rounded to the even digit."""
     rig.stand.preset(count)
     angle = Decimal(count) / Decimal(repr(rig.profile.table.counts_per_deg))
     wanted = angle.quantize(Decimal(1).scaleb(-rig.profile.serial.decimals), ROUND_HALF_EVEN)
     for letter in (b"H", b"L"):
         got = rig.read(letter)
-        said = f"a count of {count}, {angle:.6f} deg, was read with {letter!r} as {got}, not {wanted + 0}"
+        said = f"a count of {count}, {angle:.6f} deg, is read with {letter!r} as {got}, not {wanted + 0}"
         require(got == wanted, said)

@@ -1,4 +1,4 @@
-"""Chapters 4.6 and 4.7: `S` and `A` set the top speed and the acceleration."""
+"""Chapters 4.6 and 4.7: `S` and `A` set the maximum speed and the acceleration."""
 
 from protocol.conformance.bench.stand import DISCONNECT, POWER_CYCLE
 from protocol.conformance.cases.case import case
@@ -11,7 +11,7 @@ _OUT_OF_RANGE = ErrorCode.OUT_OF_RANGE
 
 @case("4.6/1", travel_deg=20)
 def s_holds_for_the_motions_after_it(rig: Rig) -> None:
-    """Set S once, with a decimal; a motion with `P` and one with `R` keep it."""
+    """Set S once, with a decimal. A motion with `P` and one with `R` use it."""
     rig.settings(rig.profile.motion.speed_deg_s * 5 / 16, rig.profile.motion.acceleration_deg_s2)
     rig.move_to(10)
     rig.finish("with P")
@@ -21,12 +21,12 @@ def s_holds_for_the_motions_after_it(rig: Rig) -> None:
 
 @case("4.6/1:reconnect", DISCONNECT, travel_deg=20)
 def s_and_a_outlive_a_client(rig: Rig) -> None:
-    """Leave the port in a motion and come back: the motion goes on, and the next one keeps S and A."""
+    """Close and open the port during a motion. The motion continues, and the next one uses the same S and A."""
     rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
     rig.move_to(20)
     rig.follow(0.3)
     rig.wire.reopen()
-    rig.finish("after a new client came")
+    rig.finish("after a new client connected")
     rig.move_to(0)
     rig.finish("the next motion")
 
@@ -45,7 +45,7 @@ def s_leaves_the_running_motion_alone(rig: Rig) -> None:
 
 @case("4.6/3")
 def an_impossible_speed_is_refused(rig: Rig) -> None:
-    """Set S to 0, below 0 and above the limit; the limit itself is accepted."""
+    """Set S to 0, below 0 and above the limit. The limit itself is accepted."""
     limit = rig.profile.limits.speed_deg_s
     for text in (b"0", b"-0", b"0.0", b"-0.5", b"-1", number(limit + 0.1), number(limit + 1000)):
         rig.refused(b"S " + text, _OUT_OF_RANGE)
@@ -71,7 +71,7 @@ def the_speed_at_power_on(rig: Rig) -> None:
 
 @case("4.7/1", travel_deg=15)
 def a_holds_for_the_motions_after_it(rig: Rig) -> None:
-    """Set A once, with a decimal; two motions keep it, both ways."""
+    """Set A once, with a decimal. Two motions use it, in both directions."""
     rig.settings(rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2 / 8)
     for target in (15, 0):
         rig.move_to(target)
@@ -92,7 +92,7 @@ def a_leaves_the_running_motion_alone(rig: Rig) -> None:
 
 @case("4.7/3")
 def an_impossible_acceleration_is_refused(rig: Rig) -> None:
-    """Set A to 0, below 0 and above the limit; the limit itself is accepted."""
+    """Set A to 0, below 0 and above the limit. The limit itself is accepted."""
     limit = rig.profile.limits.acceleration_deg_s2
     for text in (b"0", b"-0", b"0.0", b"-0.5", b"-1", number(limit + 0.1), number(limit + 1000)):
         rig.refused(b"A " + text, _OUT_OF_RANGE)

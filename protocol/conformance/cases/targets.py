@@ -10,19 +10,19 @@ from protocol.conformance.judgement.wire_checks import number
 from protocol.messages import ErrorCode
 
 _LITTLE_DEG = 0.00049
-"""Nothing, when it is rounded to thousandths, or to counts of an encoder with less than 1000 to the degree."""
+"""Becomes 0 when it is rounded to thousandths, or to counts of an encoder with fewer than 1000 counts per degree."""
 _LITTLE_S = 30.0
-"""For so long they are sent at most."""
+"""Maximum time for sending these increments."""
 _PAUSE_S = 0.1
 _MARGIN_S = 0.002
-"""A controller's ticks, by which a little motion may take longer."""
+"""Ticks of a controller by which a small motion may take longer."""
 
 _OUT_OF_RANGE = ErrorCode.OUT_OF_RANGE
 
 
 @case("4.4/1", travel_deg=190)
 def p_never_takes_the_short_way(rig: Rig) -> None:
-    """Turn backwards by more than half a turn; 4.2/3 turns by more than a whole one, both ways."""
+    """Turn backward by more than half a turn. Case 4.2/3 turns by more than a whole turn in both directions."""
     rig.settings(rig.profile.motion.speed_deg_s, rig.profile.motion.acceleration_deg_s2)
     rig.move_to(-190)
     rig.finish()
@@ -39,7 +39,10 @@ def a_position_beyond_the_counter_is_refused(rig: Rig) -> None:
 
 @case("4.4/3", PRESET)
 def a_motion_beyond_half_the_counter_is_refused(rig: Rig) -> None:
-    """Preset the counter far up, and command a position far down: the counter has both, but the way is too long."""
+    """Preset the counter to a high value, and command a low position.
+
+    The counter can hold both, but the travel is too long.
+    """
     far_deg = 0.75 * rig.profile.range_deg
     rig.stand.preset(round(far_deg * rig.profile.table.counts_per_deg))
     with rig.unmoved(b"a motion beyond half the counter"):
@@ -48,7 +51,10 @@ def a_motion_beyond_half_the_counter_is_refused(rig: Rig) -> None:
 
 @case("4.4/3:half", PRESET, travel_deg=2)
 def a_motion_of_half_the_counter_is_accepted(rig: Rig) -> None:
-    """From 0, move to the counter's lower end, which is half its range away, and stop; from 1 deg above, be refused."""
+    """From 0, move to the lower end of the counter, which is half its range away, and stop.
+
+    From 1 deg above 0, the same command is refused.
+    """
     lowest = b"P -" + _within_range(rig)
     rig.stand.preset(0)
     rig.stand_afresh_at(0)
@@ -60,16 +66,16 @@ def a_motion_of_half_the_counter_is_accepted(rig: Rig) -> None:
 
 @case("4.4/4", travel_deg=10)
 def ok_is_not_arrival(rig: Rig) -> None:
-    """`OK` comes before the table is there."""
-    rig.set_speed(min(rig.profile.motion.speed_deg_s, 10 / (10 * rig.reading_s)))  # ten readings fit the way
+    """`OK` is received before the table is at its target."""
+    rig.set_speed(min(rig.profile.motion.speed_deg_s, 10 / (10 * rig.reading_s)))  # ten readings fit the motion
     rig.move_to(10)
-    require(rig.sample().position_deg - rig.home_deg < 5, "the table was there with its OK")
+    require(rig.sample().position_deg - rig.home_deg < 5, "the table had arrived when it sent OK")
     rig.finish()
 
 
 @case("4.5/1", travel_deg=30)
 def an_increment_in_motion_is_from_the_present_reference(rig: Rig) -> None:
-    """During a motion, move by an increment: it counts from where the table is, not from where it was going."""
+    """Move by an increment during a motion: it counts from the present position, not from the target."""
     rig.settings(rig.profile.motion.speed_deg_s / 2, rig.profile.motion.acceleration_deg_s2 / 2)
     rig.move_to(30)
     rig.follow(0.5)
@@ -79,7 +85,10 @@ def an_increment_in_motion_is_from_the_present_reference(rig: Rig) -> None:
 
 @case("4.5/2", travel_deg=4)
 def increments_add_up(rig: Rig) -> None:
-    """Move by a third of a degree ten times, each time to the end, and by less than half a thousandth very often."""
+    """Move by a third of a degree ten times, each time to the end.
+
+    Then move many times by less than half a thousandth.
+    """
     for _ in range(10):
         rig.move_by(0.3333)
         rig.follow()
@@ -124,7 +133,7 @@ def an_increment_beyond_half_the_counter_is_refused(rig: Rig) -> None:
 
 @case("4.5/5:half", PRESET, travel_deg=2)
 def an_increment_of_half_the_counter_is_accepted(rig: Rig) -> None:
-    """Move by half the counter's range, both ways, and stop."""
+    """Move by half the counter's range in both directions, and stop."""
     for sign in (b"-", b""):
         rig.stand.preset(0)
         rig.stand_afresh_at(0)
@@ -132,11 +141,11 @@ def an_increment_of_half_the_counter_is_accepted(rig: Rig) -> None:
 
 
 def _within_range(rig: Rig) -> bytes:
-    """Return the greatest whole number within half the counter's range; on the default table it is just that half."""
+    """Return the largest whole number within half the counter's range. On the default table it is exactly that half."""
     return b"%d" % floor(rig.profile.range_deg)
 
 
 def _little_increments(rig: Rig) -> int:
-    """Return how many little increments show that one is lost, as far as a slow line has the time."""
+    """Return how many small increments show the loss of one, as far as a slow line has the time."""
     least, most = rig.near(0)
     return min(ceil((most - least) / _LITTLE_DEG), int(_LITTLE_S / rig.reading_s))

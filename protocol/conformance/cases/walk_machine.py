@@ -1,4 +1,4 @@
-"""The steps of a random walk, each beside a model of the registers that says what the table must answer."""
+"""The steps of a random walk, each with a model of the registers that predicts the reply."""
 
 from collections.abc import Callable
 from typing import Any
@@ -23,7 +23,7 @@ _REFUSED = (
 
 
 def _step(action: Callable[..., None]) -> Callable[..., None]:
-    """Let a rule keep its name and numbers, and turn what it finds into the failure that the search wants."""
+    """Give a rule its name and numbers, and turn its finding into the failure that the search expects."""
 
     def run(self: "RandomWalk", **arguments: Any) -> None:  # noqa: ANN401  # whatever the rule draws
         self.steps.append(" ".join([action.__name__.strip("_"), *map(str, arguments.values())]))
@@ -42,14 +42,14 @@ def _tenths(least: float, most: float) -> st.SearchStrategy[float]:
 
 _FAR = st.sampled_from((-9.0, -5.0, 5.0, 9.0))
 _SHARE = st.sampled_from((0.25, 0.5, 1.5))
-"""Of the S or A that was set, or else the change would not be seen."""
+"""Share of the present S or A; a smaller change would not be visible."""
 _POLL_S = 0.03
 
 
 class RandomWalk(RuleBasedStateMachine):
     """The six commands, waits, triggers and refused lines, in any order.
 
-    The model: S and A, the trapezoid that the reference follows, and the latch, which is unknown until it is read.
+    The model: S and A, the trapezoid of the reference, and the latch, which is unknown until it is read.
     """
 
     rig: Rig
@@ -95,7 +95,7 @@ class RandomWalk(RuleBasedStateMachine):
     @rule(angle=_FAR, seconds=_tenths(0.1, 0.3), share=_SHARE, preempts=st.booleans())
     @_step
     def set_speed_in_motion(self, angle: float, seconds: float, share: float, preempts: bool) -> None:
-        """Set S in a motion: that goes on, and the next one has it."""
+        """Set S during a motion. The motion continues, and the next one uses the new value."""
         allowed = self.rig.profile.motion
         self.rig.settings(min(10, allowed.speed_deg_s), min(60, allowed.acceleration_deg_s2))
         speed_deg_s = _changed(self.rig.top_deg_s, share, allowed.speed_deg_s)
@@ -104,14 +104,14 @@ class RandomWalk(RuleBasedStateMachine):
     @rule(angle=_FAR, seconds=_tenths(0.1, 0.3), share=_SHARE, preempts=st.booleans())
     @_step
     def set_acceleration_in_motion(self, angle: float, seconds: float, share: float, preempts: bool) -> None:
-        """Set A in a motion: that goes on, and the next one has it."""
+        """Set A during a motion. The motion continues, and the next one uses the new value."""
         allowed = self.rig.profile.motion
         self.rig.settings(min(20, allowed.speed_deg_s), min(40, allowed.acceleration_deg_s2))
         rate_deg_s2 = _changed(self.rig.rate_deg_s2, share, allowed.acceleration_deg_s2)
         self._in_motion(angle, seconds, lambda: self.rig.set_acceleration(rate_deg_s2), preempts)
 
     def _in_motion(self, angle: float, seconds: float, change: Callable[[], None], preempts: bool) -> None:
-        """Begin a motion, change a setting in it, and begin the next one, in the motion or after it."""
+        """Start a motion, change a setting during it, and start the next one, during or after that motion."""
         self.rig.move_to(angle)
         self._sample_for(seconds)
         change()
@@ -122,14 +122,14 @@ class RandomWalk(RuleBasedStateMachine):
         self._sample_for(0.5)
 
     def _left_s(self) -> float:
-        """Return how long the motion still takes."""
+        """Return the remaining time of the motion."""
         last = self.rig.motion.expectations[-1]
         return max(0.0, last.began_s + last.motion.duration_s - self.rig.wire.clock.now_s())
 
     @rule(seconds=_tenths(0, 0.5))
     @_step
     def wait(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance the time."""
         self.rig.wire.clock.sleep_s(seconds)
 
     @rule()
@@ -141,7 +141,7 @@ class RandomWalk(RuleBasedStateMachine):
     @rule()
     @_step
     def read_latch(self) -> None:
-        """Read the latch, which keeps what it holds."""
+        """Read the latch, which keeps its value."""
         latched = float(self.rig.read(b"L"))
         if self.latch is None:
             self.latch = latched, latched
@@ -169,7 +169,7 @@ class RandomWalk(RuleBasedStateMachine):
     @rule(letters=st.lists(st.sampled_from((b"H", b"L")), min_size=2, max_size=6))
     @_step
     def read_several_at_once(self, letters: list[bytes]) -> None:
-        """Send several readings in one piece."""
+        """Send several readings in one write."""
         self.rig.wire.send(b"".join(letter + b"\r" for letter in letters))
         for letter in letters:
             self.rig.angle_in(self.rig.reply_to(letter), letter)
@@ -177,26 +177,26 @@ class RandomWalk(RuleBasedStateMachine):
     @rule(half=st.sampled_from((b"R 5", b"P", b"H", b"S 1")))
     @_step
     def cancel(self, half: bytes) -> None:
-        """Leave a half line, and cancel it."""
+        """Send an incomplete line, and cancel it."""
         self.rig.wire.send(half)
         self.rig.refused(b"\x18", ErrorCode.BAD_BYTE)
 
     @rule()
     @_step
     def come_to_rest(self) -> None:
-        """Wait for the end of the motion, and look where it is."""
+        """Wait for the end of the motion, and read the position."""
         self.rig.follow()
         resting = float(self.rig.wait_for_rest())
         last = self.rig.motion.expectations[-1]
         low, high = self.rig.resting_range()
         require(low <= resting <= high, f"at rest at {resting:g} deg, allowed {low:.3f} to {high:.3f}")
-        # Whatever the time of an increment left open is known now.
+        # The end position is known now, although the start time of an increment was not.
         self.rig.expect(b"P " + number(last.motion.target_deg))
         self.rig.wait_for_rest()
         self.rig.stand_at(last.motion.target_deg)
 
     def teardown(self) -> None:
-        """Leave the table at rest; a failure has been told already."""
+        """Leave the table at rest. A failure has already been reported."""
 
     def _sample_for(self, seconds: float) -> None:
         until_s = self.rig.wire.clock.now_s() + seconds
@@ -209,11 +209,11 @@ class RandomWalk(RuleBasedStateMachine):
         excess = self.rig.excess(sample)
         require(
             excess <= self.rig.profile.tolerance.tracking_deg,
-            f"the table is {excess:.3g} deg from where its reference can be, at {sample.position_deg:g} deg",
+            f"the table is {excess:.3g} deg from the possible range of its reference, at {sample.position_deg:g} deg",
         )
         return sample.position_deg
 
 
 def _changed(value: float, share: float, allowed: float) -> float:
-    """Return a value changed by a share; the other way where that would be more than the profile allows."""
+    """Return a value changed by a share, in the other direction where the profile does not allow the result."""
     return value * share if value * share <= allowed else value / share

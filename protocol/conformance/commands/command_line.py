@@ -1,4 +1,4 @@
-"""What the kit's command line says and asks."""
+"""What the kit's command line prints, and what it asks the user."""
 
 import sys
 
@@ -10,47 +10,47 @@ from protocol.progress import is_terminal, show_line
 
 
 class UsageError(Exception):
-    """The command line cannot be carried out; the message says why."""
+    """The command line cannot be executed; the message states why."""
 
 
 def say(sentence: str) -> None:
-    """Tell the person at the terminal, if there is one."""
+    """Print a line for the user, if the output is a terminal."""
     ending.say("conformance", sentence)
 
 
 def tell(text: str) -> None:
-    """Print a result. When nobody reads results any more the work goes on: its files hold them all."""
+    """Print a result. If the output is closed, the work continues: the files contain all results."""
     if sys.stdout is None:
         return
     encoding = sys.stdout.encoding or "utf-8"
-    text = text.encode(encoding, "backslashreplace").decode(encoding)  # the name of a device may hold any byte
+    text = text.encode(encoding, "backslashreplace").decode(encoding)  # a device name may contain any byte
     try:
         sys.stdout.write(f"{text}\n")
         sys.stdout.flush()
     except OSError as error:
-        if not isinstance(error, BrokenPipeError):  # as `| head` ends it
+        if not isinstance(error, BrokenPipeError):  # `| head` closes it
             say(f"stdout: {error.strerror}; no more is printed")
         ending.give_up_stdout()
 
 
 def show_progress(text: str) -> None:
-    """Show how far the work is, in place of what was shown before; on a terminal that can do so only."""
+    """Show the progress of the work in place of the previous line; only on a terminal that can replace a line."""
     show_line(text, sys.stderr)
 
 
 def confirm(url: str, may_move: bool, profile: Profile, port: ReopenablePort) -> None:
-    """Let nothing real move before somebody has agreed to how far and how fast.
+    """Require that the user accepts how far and how fast a real table moves, before it moves.
 
     Raises:
-        UsageError: nobody has.
+        UsageError: the user did not accept.
     """
     if may_move or is_simulated(port):
         return
     limits = f"the table at {url} will turn {profile.motion}"
     if not is_terminal(sys.stdin):
-        raise UsageError(f"{limits}; say --yes if it may")
+        raise UsageError(f"{limits}; add --yes to allow this")
     say(f"{limits}.")
-    sys.stderr.write("Is its way free? Type yes to begin: ")
+    sys.stderr.write("Is the table free to turn? Type yes to start: ")
     sys.stderr.flush()
     if sys.stdin.readline().strip().lower() != "yes":
-        raise UsageError("nothing was moved")
+        raise UsageError("the table was not moved")

@@ -1,4 +1,4 @@
-"""A replay from the command line: a recorded wire sent to another table, and where the answers part on stdout."""
+"""A replay from the command line: send a recorded session to another table, and print the differing replies."""
 
 import argparse
 from collections.abc import Sequence
@@ -18,13 +18,13 @@ from protocol.conformance.session.suite import Session, session_at
 
 
 def run_replay(options: argparse.Namespace, profile: Profile, port: ReopenablePort, cases: Sequence[Case]) -> int:
-    """Send what the record has of some cases to the table at a port; return 1 where an answer is another, else 0.
+    """Send some recorded cases to the table at a port. Return 1 if a reply differs, else 0.
 
     Raises:
-        RecordError: the file is no record.
-        UsageError: it holds none of these cases, or it may not be sent to this table.
-        SessionError: what is at the port cannot be tested, or stands elsewhere than where the record began.
-        BenchError: what is beside it does not work.
+        RecordError: the file is not a record.
+        UsageError: the file contains none of these cases, or they must not be sent to this table.
+        SessionError: the device at the port cannot be tested, or is not at the recorded start position.
+        BenchError: an operation on the bench failed.
     """
     record = _wanted(read_record(options.replay), cases, options.replay)
     _check_reach(record.profile, profile, options.replay)
@@ -53,10 +53,11 @@ def run_replay(options: argparse.Namespace, profile: Profile, port: ReopenablePo
 def _send(
     record: Record, starts_deg: Sequence[float], session: Session, wire: Wire, stand: Stand, profile: Profile
 ) -> int:
-    """Replay each case from where it has to begin, and return how many part.
+    """Move to the start of each case, replay it, and return how many cases differ.
 
     Raises:
-        SessionError: the table is elsewhere, so it carried out what it has to refuse; or it refuses S or A.
+        SessionError: the table is at another position because it executed a command that it must refuse, or it refused
+            S or A.
     """
     differing = 0
     for case, start_deg in zip(record.cases, starts_deg, strict=True):
@@ -68,16 +69,16 @@ def _send(
 
 
 def _wanted(record: Record, cases: Sequence[Case], path: Path) -> Record:
-    """Return the record with the wanted cases alone, those that were skipped when it was made left out."""
+    """Return the record with only the selected cases, without those that were skipped when it was made."""
     names = {case.id for case in cases}
     kept = tuple(case for case in record.cases if case.id in names and case.wire)
     if not kept:
-        raise UsageError(f"{path}: holds no wire of these cases; nothing can be sent")
+        raise UsageError(f"{path}: contains no traffic of these cases; choose other cases with --case")
     return replace(record, cases=kept)
 
 
 def _check_reach(recorded: Profile, allowed: Profile, path: Path) -> None:
-    """Refuse a record that moves a table farther or faster than this one may be moved."""
+    """Refuse a record that would move a table farther or faster than the profile allows."""
     for key in ("reach_deg", "speed_deg_s", "acceleration_deg_s2"):
         wanted, most = getattr(recorded.motion, key), getattr(allowed.motion, key)
         if wanted > most:

@@ -1,4 +1,4 @@
-"""A run of the suite from the command line: the verdicts on stdout, and the files that it leaves."""
+"""A run of the suite from the command line: print the verdicts and write the files."""
 
 import argparse
 import os
@@ -28,12 +28,12 @@ _NO_FILES = 2
 
 
 def run_suite(options: argparse.Namespace, profile: Profile, port: ReopenablePort, cases: Sequence[Case]) -> int:
-    """Run cases on the table at a port, leave record, report and JUnit's XML, and return the exit status.
+    """Run cases on the table at a port, write the record, the report and the JUnit XML, and return the exit status.
 
     Raises:
-        UsageError: the files cannot be put where they should go, or nobody agreed to the table's being moved.
-        SessionError: what is at the port cannot be tested.
-        BenchError: what is beside it does not work.
+        UsageError: the files cannot be written, or the user did not accept the motion of the table.
+        SessionError: the device at the port cannot be tested.
+        BenchError: an operation on the bench failed.
     """
     junit = _junit_file(options)
     confirm(options.port, options.yes, profile, port)
@@ -57,32 +57,32 @@ def run_suite(options: argparse.Namespace, profile: Profile, port: ReopenablePor
         except KeyboardInterrupt as interrupt:
             status = status_after(interrupt)
             say(f"interrupted after {len(outcomes)} of {len(cases)} cases; {session.how_it_was_left}")
-    tell(", ".join(f"{count} {verdict}" for verdict, count in count_verdicts(outcomes).items()) or "nothing was run")
+    tell(", ".join(f"{count} {verdict}" for verdict, count in count_verdicts(outcomes).items()) or "no case was run")
     written = _write(options, header, outcomes, durations_s, junit)
     return status or (int(any(outcome.verdict in _BAD for outcome in outcomes)) if written else _NO_FILES)
 
 
 def _junit_file(options: argparse.Namespace) -> Path:
-    """Return where JUnit's XML goes, when all files can be written."""
+    """Return the path of the JUnit XML, after a check that all files can be written."""
     junit: Path = options.junit or options.out / "junit.xml"
     if junit.is_dir():
         raise UsageError(f"--junit {junit}: is a directory; name a file")
     if junit in {options.out / "record.json", options.out / "report.html"}:
-        raise UsageError(f"--junit {junit}: goes to another file of --out; name another")
+        raise UsageError(f"--junit {junit}: is another output file of --out; choose another name")
     for directory in (options.out, junit.parent):
         try:
             directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise UsageError(f"{directory}: cannot create directory: {error.strerror}") from error
         if not os.access(directory, os.W_OK | os.X_OK):
-            raise UsageError(f"{directory}: cannot be written to; name another directory, or change its rights")
+            raise UsageError(f"{directory}: is not writable; choose another directory, or change its permissions")
     return junit
 
 
 def _write(
     options: argparse.Namespace, header: Header, outcomes: Sequence[Outcome], durations_s: Sequence[float], junit: Path
 ) -> bool:
-    """Write the files, and return whether all could be; one that cannot takes none of the others with it."""
+    """Write the files, and return whether all were written. A failure of one does not affect the others."""
     report = options.out / "report.html"
     writers = (
         partial(write_record, options.out / "record.json", header, outcomes),
@@ -91,7 +91,7 @@ def _write(
     )
     done = [_is_done(write) for write in writers]
     if all(done):
-        say(f"the report is {report}")
+        say(f"report: {report}")
     return all(done)
 
 
@@ -107,9 +107,9 @@ def _is_done(write: Callable[[], None]) -> bool:
 def _progress(
     outcomes: list[Outcome], durations_s: list[float], total: int, options: argparse.Namespace
 ) -> Callable[[Outcome], None]:
-    """Return what takes in each outcome: it prints those worth reading, and on a terminal shows how far the run is.
+    """Return the callback for each outcome. It prints those of interest, and the progress on a terminal.
 
-    How long a case took in real time, which is another than a simulated table's, is kept apart from its outcome.
+    The real time of a case differs from the time of a simulated table, so it is stored beside the outcome.
     """
     clock = WallClock()
     last_s = clock.now_s()

@@ -1,1 +1,1 @@
-"""What a table should do, and the verdict on what it did."""
+"""The correct behavior of a table, and the verdict on its actual behavior."""

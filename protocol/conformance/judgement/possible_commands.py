@@ -1,4 +1,7 @@
-"""What a table may take a line for: one of this protocol, and one that reads more than clause 4.1 allows; no I/O."""
+"""Commands that a table may read in a line: those of this protocol, and those of a wider grammar than clause 4.1.
+
+No I/O.
+"""
 
 import re
 from collections.abc import Iterator
@@ -15,7 +18,10 @@ _SIGNS_AND_DIGITS = frozenset("+-0123456789")
 
 
 def certain_command(line: bytes) -> Command | None:
-    """Return what every table of this protocol takes a line for, LF and all; None where it must refuse the line."""
+    """Return the command that every table of this protocol reads in a line that may contain LF.
+
+    Return None for a refused line.
+    """
     text = line.replace(b"\n", b"")
     if len(text) > LINE_LIMIT or text.translate(None, _PRINTABLE):
         return None
@@ -24,10 +30,11 @@ def certain_command(line: bytes) -> Command | None:
 
 
 def possible_commands(line: bytes) -> Iterator[Command]:
-    """Yield the settings and motions that another table may read in a line which this protocol refuses.
+    """Yield the settings and motions that another table may read in a line that this protocol refuses.
 
-    Such a table may know small letters, start amid the line, end lines at LF, strip the eighth bit, pass over bytes
-    that are no part of a number, stop at the first of them, or know exponents, commas and hexadecimal numbers.
+    Another table may accept lowercase letters, start within the line, end lines at LF, or clear the eighth bit. It may
+    skip bytes that do not belong to a number, or stop at the first of them. It may also read exponents, commas and
+    hexadecimal numbers.
     """
     text = bytes(byte & 0x7F for byte in line).decode("ascii")
     for index, letter in enumerate(text):
@@ -38,7 +45,7 @@ def possible_commands(line: bytes) -> Iterator[Command]:
 
 
 def glued(lines: list[bytes]) -> Iterator[bytes]:
-    """Yield the lines that come about where bytes between two lines are lost: a beginning, and a later end."""
+    """Yield the lines that result from lost bytes: the start of one line and the end of a later one."""
     ends = {line[cut:] for line in lines for cut in range(1, len(line))}
     for line in lines:
         if line[:1].decode("latin-1") in _LETTERS:
@@ -46,7 +53,7 @@ def glued(lines: list[bytes]) -> Iterator[bytes]:
 
 
 def _numbers_in(rest: str) -> Iterator[Decimal]:
-    """Yield the numbers that the rest of a line may be read as."""
+    """Yield the numbers that can be read from the rest of a line."""
     words = [found[0].replace(",", ".") for found in _NUMBER.finditer(rest)]
     merged = "".join(character for character in rest if character in _SIGNS_AND_DIGITS or character == ".")
     digits = "".join(character for character in rest if character.isdigit())

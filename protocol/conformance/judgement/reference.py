@@ -1,4 +1,4 @@
-"""Where the table's reference can have been, and what was seen beside it; nothing here talks to a table."""
+"""The possible positions of the table's reference, and the measured positions; no I/O."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -7,18 +7,21 @@ from typing import NamedTuple
 from protocol.trapezoid import Motion, MotionCommand, ReferenceState
 
 _DELAYS = ((0.0,), (-1.0,), (1.0,), (-1.0, 1.0), (1.0, -1.0))
-"""When commands were carried out, within the times that they leave open: the courses that a motion may have taken."""
+"""The times at which commands were executed, within their uncertainty.
+
+Each choice of times gives one possible course of a motion.
+"""
 
 
 class Instant(NamedTuple):
-    """A time that is known to lie within a window: its middle and its half width."""
+    """A time that is known to lie in a window: its middle and its half width."""
 
     middle_s: float
     half_width_s: float
 
 
 class Sample(NamedTuple):
-    """A position that the table reported: the middle and the half width of the time in which it was so."""
+    """A position that the table reported: the middle and the half width of the time at which it was valid."""
 
     time_s: float
     position_deg: float
@@ -26,37 +29,37 @@ class Sample(NamedTuple):
 
 
 class Expectation(NamedTuple):
-    """A commanded motion, and the time at which it began."""
+    """A commanded motion, and its start time."""
 
     began_s: float
     motion: Motion
 
     def at(self, time_s: float) -> ReferenceState:
-        """Return where the reference should be, and at what speed."""
+        """Return the position and speed of the reference."""
         return self.motion.at(time_s - self.began_s)
 
 
 @dataclass
 class MotionRecord:
-    """What was expected and what was seen of a table in motion."""
+    """Expected and measured values of a table in motion."""
 
     expectations: list[Expectation] = field(default_factory=list)
     samples: list[Sample] = field(default_factory=list)
 
 
 class Reference:
-    """The courses that the reference may have taken, one for each way in which its commands may have been timed.
+    """The possible courses of the reference, one for each combination of command times.
 
-    The first is that with each command carried out in the middle of its time.
+    In the first course, each command is executed in the middle of its window.
     """
 
     def __init__(self, expectations: list[Expectation]) -> None:
-        """Take the list in which the first course is kept."""
+        """Use the list in which the first course is stored."""
         self._expectations = expectations
         self._courses: list[list[Expectation]] = []
 
     def stand_at(self, time_s: float, angle_deg: float) -> None:
-        """Rest at an angle from a time on: what was open before is known now."""
+        """Start at rest at an angle at a time. Earlier uncertainty ends there."""
         resting = Expectation(time_s, Motion.at_rest(angle_deg))
         self._expectations.append(resting)
         self._courses = [self._expectations, *([resting] for _ in _DELAYS[1:])]
@@ -64,7 +67,7 @@ class Reference:
     def move(
         self, instant: Instant, target_from: Callable[[float], float], top_deg_s: float, rate_deg_s2: float
     ) -> None:
-        """Take another motion at an instant; its target may depend on where the reference is then."""
+        """Start another motion at an instant. Its target may depend on the position of the reference at that time."""
         for course, delays in zip(self._courses, _DELAYS, strict=True):
             began_s = instant.middle_s + instant.half_width_s * delays[len(course) % len(delays)]
             state = _at(course, began_s)
@@ -72,11 +75,11 @@ class Reference:
             course.append(Expectation(began_s, motion))
 
     def at(self, time_s: float) -> ReferenceState:
-        """Return where the reference should be at a time, and its speed."""
+        """Return the position of the reference at a time, and its speed."""
         return _at(self._expectations, time_s)
 
     def span_deg(self, instant: Instant) -> tuple[float, float]:
-        """Return the least and the greatest position at which the reference can have been at an instant."""
+        """Return the minimum and maximum possible position of the reference at an instant."""
         positions = [
             _at(course, instant.middle_s + offset_s)[0]
             for course in self._courses
@@ -85,7 +88,7 @@ class Reference:
         return min(positions), max(positions)
 
     def target_span_deg(self) -> tuple[float, float]:
-        """Return the least and the greatest target; that of an increment is as open as its moment."""
+        """Return the minimum and maximum target. The target of an increment is as uncertain as its time."""
         targets = [course[-1].motion.target_deg for course in self._courses]
         return min(targets), max(targets)
 

@@ -1,4 +1,4 @@
-"""What a case finds: measurements with their ranges, and a verdict."""
+"""Results of a case: measurements with their ranges, and a verdict."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -6,7 +6,7 @@ from math import inf
 
 
 class Verdict(StrEnum):
-    """How a case ended, the worse the later."""
+    """How a case ended, from best to worst."""
 
     PASS = "pass"  # noqa: S105  # no password
     SKIPPED = "skipped"
@@ -16,18 +16,18 @@ class Verdict(StrEnum):
 
 
 MARGIN = 0.1
-"""The share of a range, at each of its ends, in which a measurement is marginal."""
+"""A measurement within this share of its range, from either end, is marginal."""
 
 _ROUNDING = 1e-9
-"""What binary fractions may make of a decimal that lies just at the end of its range."""
+"""Rounding error of a decimal that lies exactly at the end of its range."""
 
 
 class NonconformityError(Exception):
-    """The table did not do what the clause says; the message says what it did instead."""
+    """The table violates the clause. The message states what it did instead."""
 
 
 class InapplicableError(Exception):
-    """A case finds that it cannot be done where it is; the message says what is lacking."""
+    """A case cannot be run under the present conditions. The message states what is missing."""
 
 
 def require(condition: bool, otherwise: str) -> None:
@@ -38,7 +38,7 @@ def require(condition: bool, otherwise: str) -> None:
 
 @dataclass(frozen=True)
 class Measurement:
-    """A measured quantity and the closed range that it must lie in; an end that is None is open."""
+    """A measured quantity and its allowed closed range. An end that is None is open."""
 
     name: str
     value: float
@@ -57,9 +57,9 @@ class Measurement:
 
     @property
     def margin(self) -> float:
-        """Distance from the nearer end of the range, as a share of its width; negative outside of it.
+        """Distance from the nearest end of the range, as a share of its width; negative outside of the range.
 
-        A range without a width has no margin: infinity with the value in it, minus infinity without.
+        A range without width has no margin: infinity for a value within it, minus infinity for others.
         """
         low, high, width = self._range
         distance = min(self.value - low, high - self.value)
@@ -69,7 +69,7 @@ class Measurement:
 
     @property
     def _range(self) -> tuple[float, float, float]:
-        """Both ends, and the width; with one end open the width is the size of the other."""
+        """Both ends, and the width. With one open end, the width is the absolute value of the other end."""
         low = -inf if self.least is None else self.least
         high = inf if self.most is None else self.most
         width = high - low

@@ -1,4 +1,4 @@
-"""What is said on the wire, held against the specification to the byte."""
+"""Check the traffic on the line against the specification, byte by byte."""
 
 import re
 from collections.abc import Iterator
@@ -11,28 +11,28 @@ from protocol.conformance.profile.profile import Profile
 from protocol.messages import ANGLE_LETTERS, ErrorCode
 
 QUIET_S = 0.05
-"""What must stay silent is listened to for this long, and the latency."""
+"""A line that must stay silent is read for this time plus the latency."""
 
 _PATIENCE_S = 60.0
-"""Five times the buffer are answered within it at 300 baud."""
+"""At 300 baud, five times the buffer is answered within this time."""
 
-_WHITE_SPACE = "a reply ends in CR alone and has no space before it, clause 5.1/4"
+_WHITE_SPACE = "a reply ends with CR only and has no space before it, clause 5.1/4"
 
 _SHOWN = 40
-"""Of bytes that are no line, so many are shown."""
+"""This many bytes that are not a line are shown."""
 
 _STAND_STILL_S = 0.15
-"""At 10 deg/s2 a table makes 0.11 deg in it."""
+"""Time in which a table turns by 0.11 deg at 10 deg/s2."""
 
 _ANGLE = re.compile(rf"([{ANGLE_LETTERS}]) (-?(?:0|[1-9][0-9]*)\.([0-9]+))".encode())
 
 
 class WireChecks:
-    """Sends lines and requires their replies; what is not as it must be raises NonconformityError.
+    """Sends lines and checks their replies. A wrong reply raises NonconformityError.
 
     Attributes:
-        wire: the table's wire.
-        profile: what is known of the table.
+        wire: the table's line.
+        profile: properties of the table.
     """
 
     def __init__(self, wire: Wire, profile: Profile) -> None:
@@ -43,13 +43,13 @@ class WireChecks:
         """Send a line and return its reply.
 
         Raises:
-            NonconformityError: none came in time, or there is white space around it.
+            NonconformityError: no reply in time, or white space around it.
         """
         self.wire.send(line + CR)
         return self.reply_to(line)
 
     def reply_to(self, line: bytes) -> Line:
-        """Return the next reply, which is that to `line`."""
+        """Return the next reply, which belongs to `line`."""
         reply = self.wire.read_line(self.profile.serial.timeout_s)
         if reply is None:
             heard = self.wire.forget()[:_SHOWN]
@@ -59,13 +59,13 @@ class WireChecks:
         return reply
 
     def expect(self, line: bytes, reply: bytes = b"OK") -> Line:
-        """Send a line and require its very reply."""
+        """Send a line and require an exact reply."""
         got = self.ask(line)
         require(got.text == reply, f"{line!r} got {got.text!r}, not {reply!r}")
         return got
 
     def refused(self, line: bytes, code: ErrorCode) -> None:
-        """Send a line and require its refusal: by its number, or by silence where there are no error replies."""
+        """Send a line and require its refusal: by its error number, or by silence if the table has no error replies."""
         self.wire.send(line + CR)
         self.expect_refusal(line, code)
 
@@ -79,21 +79,24 @@ class WireChecks:
         require(got.text.startswith(begins), f"{line!r} got {got.text!r}, not {begins.decode()}{code.text}")
 
     def silence(self, why: str) -> None:
-        """Require that nothing comes."""
+        """Require silence."""
         heard = self.wire.listen(QUIET_S + self.profile.serial.latency_s)
         require(bool(heard.strip()) or not heard, f"{why} got {heard!r}: {_WHITE_SPACE}")
         require(not heard, f"{why} got {heard!r}, not silence")
 
     def drain(self) -> bytes:
-        """Return all that comes until the line has fallen silent; a table may be slow to answer (2.2/1 is a should)."""
+        """Return everything that is received until the line is silent.
+
+        A table may be slow to reply (2.2/1 is a "should").
+        """
         return self.wire.drain(self.profile.serial.latency_s + self.profile.serial.timeout_s / 3, _PATIENCE_S)
 
     def read(self, letter: bytes = b"H") -> Decimal:
-        """Read a register in exactly the form that clause 5.2 gives it."""
+        """Read a register; its reply must have exactly the form of clause 5.2."""
         return self.angle_in(self.ask(letter), letter)
 
     def angle_in(self, reply: Line, letter: bytes = b"H") -> Decimal:
-        """Return the angle that a reply says, or raise NonconformityError."""
+        """Return the angle in a reply, or raise NonconformityError."""
         found = _ANGLE.fullmatch(reply.text)
         decimals = self.profile.serial.decimals
         if found is None or found[1] != letter or len(found[3]) != decimals:
@@ -108,7 +111,7 @@ class WireChecks:
 
     @contextmanager
     def unmoved(self, because: bytes) -> Iterator[None]:
-        """Require that the table stands still over a `with` block."""
+        """Require that the table does not move during a `with` block."""
         before = self.read()
         yield
         self.wire.clock.sleep_s(_STAND_STILL_S)
@@ -120,5 +123,5 @@ class WireChecks:
 
 
 def number(value: float) -> bytes:
-    """Return a number as it goes on the wire, to four decimals at most."""
+    """Return a number as text with at most four decimals."""
     return f"{value:.4f}".rstrip("0").removesuffix(".").encode()

@@ -1,1 +1,1 @@
-"""What is known of a table under test, and what the specification says."""
+"""The properties of a table under test, and the clauses of the specification."""

@@ -1,4 +1,4 @@
-"""The clauses of the specification, read from its own page so that they are quoted and never retold."""
+"""The clauses of the specification. They are read from its page, so their text exists once."""
 
 import re
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The profile: what is known of the table under test, and how far and fast it may be moved."""
+"""The profile: the properties of the table under test, and the allowed range and speed of its motion."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
@@ -22,12 +22,12 @@ DEFAULT_FILE = Path(__file__).with_name("default.toml")
 
 
 class ProfileError(ValueError):
-    """A profile that cannot be used; the message names the file, the key and what is allowed."""
+    """A profile that cannot be used. The message names the file, the key and the allowed values."""
 
 
 @dataclass(frozen=True)
 class Profile:
-    """Everything that the suite takes for granted about the table under test."""
+    """Everything that the suite assumes about the table under test."""
 
     table: TableProfile
     serial: SerialProfile
@@ -40,22 +40,22 @@ class Profile:
 
     @property
     def resolution_deg(self) -> float:
-        """The unit of the last decimal in a reply."""
+        """The unit of the last decimal of a reply."""
         return float(10.0**-self.serial.decimals)
 
     @property
     def step_deg(self) -> float:
-        """The least change of position that a reading shows: a unit of the last decimal, or a count if that is more."""
+        """The resolution of a reading: one unit of the last decimal or one count, whichever is larger."""
         return max(self.resolution_deg, 1.0 / self.table.counts_per_deg)
 
     @property
     def range_deg(self) -> float:
-        """The positions that a register holds: from minus this up to this, without it."""
+        """The range of positions that a register can hold: from minus this value up to this value (excluded)."""
         return 2.0**31 / self.table.counts_per_deg
 
     @property
     def byte_s(self) -> float:
-        """The time that a byte takes on the line."""
+        """The transmission time of a byte."""
         return 10.0 / self.serial.baud if self.serial.baud else 0.0
 
     def as_dict(self) -> dict[str, Any]:
@@ -64,10 +64,10 @@ class Profile:
 
 
 def load_profile(path: Path | None = None) -> Profile:
-    """Read a profile: the default table's, with the keys of the file at `path` over them.
+    """Read a profile: the default profile, with the keys of the file at `path` replaced.
 
     Raises:
-        ProfileError: the file cannot be read, a key, a type or a value is wrong, or two values contradict each other.
+        ProfileError: the file cannot be read, a key, a type or a value is wrong, or two values are inconsistent.
     """
     default = TomlTable(DEFAULT_FILE.name, {}, error=ProfileError)
     top = default if path is None else TomlTable.load(path, ProfileError)
@@ -75,7 +75,7 @@ def load_profile(path: Path | None = None) -> Profile:
 
 
 def profile_from(values: Mapping[str, Any], source: str) -> Profile:
-    """Return the profile that plain values, complete, describe; see `load_profile`."""
+    """Return the profile from complete plain values; see `load_profile`."""
     return _profile(TomlTable(source, values, error=ProfileError), {})
 
 
@@ -119,8 +119,8 @@ def _wrong_motion(profile: Profile) -> Iterator[str]:
 def _wrong_waivers(profile: Profile) -> Iterator[str]:
     for number, reason in profile.waive.items():
         if number not in specification():
-            yield f"waive names {number}, which is no clause"
+            yield f"waive names {number}, which is not a clause"
         elif specification()[number].level == "must":
             yield f"waive names {number}, which is a must; only a should can be waived"
         elif not reason.strip():
-            yield f"waive.{number} is empty; it must say why"
+            yield f"waive.{number} is empty; it must state the reason"

@@ -1,4 +1,4 @@
-"""The sections of a profile, key by key; what each key means is said in `default.toml`."""
+"""The sections of a profile, key by key. `default.toml` explains each key."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,14 +6,14 @@ from typing import Any
 from protocol.toml_section import quantity
 
 
-def _amount() -> Any:  # noqa: ANN401  # stands for a value of the annotated type
+def _amount() -> Any:  # noqa: ANN401  # returned in place of a value of the annotated type
     """Declare a number that is not negative."""
     return quantity(at_least=0)
 
 
 @dataclass(frozen=True)
 class TableProfile:
-    """Which table it is."""
+    """Identity of the table."""
 
     name: str
     counts_per_deg: float = quantity(above=0)
@@ -21,7 +21,7 @@ class TableProfile:
 
 @dataclass(frozen=True)
 class SerialProfile:
-    """The line, and the times on it."""
+    """The serial line, and its times."""
 
     baud: int = quantity(at_least=0, at_most=10**9)
     decimals: int = quantity(at_least=1, at_most=6)
@@ -41,7 +41,7 @@ class MotionValues:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How exact the table must be."""
+    """Required accuracy of the table."""
 
     rest_deg: float = _amount()
     tracking_deg: float = _amount()
@@ -54,7 +54,7 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class MotionAllowed:
-    """How far, each way from its first position, and how fast the table may be moved."""
+    """The allowed motion: the range in each direction from the first position, and the speed."""
 
     reach_deg: float = _amount()
     speed_deg_s: float = _amount()
@@ -69,7 +69,7 @@ class MotionAllowed:
 
 @dataclass(frozen=True)
 class RigProfile:
-    """What the rig can do beyond the wire."""
+    """Actions of the rig besides the serial line."""
 
     sees_disconnect: bool
     trigger_command: tuple[str, ...]

@@ -1,1 +1,1 @@
-"""The kit as a part of pytest."""
+"""The pytest part of the kit."""

@@ -1,4 +1,4 @@
-"""What the fixture `rotary_table` gives to a test."""
+"""The value of the fixture `rotary_table` in a test."""
 
 import subprocess
 from collections.abc import Callable, Iterator
@@ -20,7 +20,7 @@ from protocol.errors import TableError
 from protocol.own_program import own_environment, own_program
 
 PTY = "pty"
-"""In the place of a port's URL: a fresh emulator on a pseudo-terminal."""
+"""Given instead of a port's URL: a new emulator on a pseudo-terminal."""
 _START_S = 20.0
 
 
@@ -28,9 +28,10 @@ class RotaryTable:
     """A rotary table for one test.
 
     Attributes:
-        url: what opens it. A table in process has nothing but `port`: each opening of `emulator://` is another table.
-        control: the control channel of an emulator in another process, where there is one.
-        profile: what is known of it.
+        url: opens the table. A table in the same process has only `port`: each opening of `emulator://` is another
+            table.
+        control: the control channel of an emulator in another process, if there is one.
+        profile: properties of the table.
     """
 
     def __init__(self, url: str, control: Path | None, profile: Path | None) -> None:
@@ -44,7 +45,7 @@ class RotaryTable:
 
     @cached_property
     def port(self) -> ReopenablePort:
-        """The open port, for code that takes one; opened at the first use, closed after the test."""
+        """The open port. It is opened at the first use and closed after the test."""
         try:
             port = open_port(self.url, self.profile)
         except SessionError as error:
@@ -54,16 +55,16 @@ class RotaryTable:
 
     @cached_property
     def client(self) -> TableClient:
-        """A client on the port."""
+        """A client that uses the port."""
         serial, motion = self.profile.serial, self.profile.motion
         return TableClient(self.port, serial.timeout_s, serial.decimals, motion.acceleration_deg_s2)
 
     def trigger(self) -> None:
-        """Put one edge on the trigger input; a test is skipped where the rig cannot."""
+        """Apply one edge to the trigger input. Skip the test if the rig cannot do this."""
         self._do(TRIGGER, lambda stand: stand.trigger())
 
     def power_cycle(self) -> None:
-        """Switch the table off and on; a test is skipped where the rig cannot."""
+        """Switch the table off and on. Skip the test if the rig cannot do this."""
         self._do(POWER_CYCLE, lambda stand: stand.power_cycle())
 
     def __enter__(self) -> Self:
@@ -77,16 +78,16 @@ class RotaryTable:
             return
         try:
             if not getattr(self.port, "is_open", True):
-                self.port.open()  # a test may close it while the table moves
+                self.port.open()  # a test may close the port while the table moves
             self.client.stop()
         except (TableError, OSError):
-            pass  # a test may leave a table that does not answer
+            pass  # a test may leave a table that does not reply
         finally:
             self.port.close()
 
     @cached_property
     def _stand(self) -> Stand:
-        # A pty has one client, so that what stands beside it does not open it.
+        # A pty has only one client, so the rig must not open it.
         return stand_beside(self.port, self.control, self.profile)
 
     def _do(self, capability: str, deed: Callable[[Stand], None]) -> None:
@@ -99,8 +100,8 @@ class RotaryTable:
 
 
 @contextmanager
-def pty_stand_in(folder: Path) -> Iterator[tuple[str, Path]]:
-    """Run an emulator on a pseudo-terminal; yield its device and its control channel."""
+def pty_emulator(folder: Path) -> Iterator[tuple[str, Path]]:
+    """Run an emulator on a pseudo-terminal, and yield its device and its control channel."""
     control = folder / "control"
     command = own_program("emulator", "--pty", "--control", str(control))
     with subprocess.Popen(  # noqa: S603 - this very interpreter, with words of our own

@@ -15,26 +15,28 @@ from protocol.conformance.cases.case import Case
 from protocol.conformance.cases.catalog import all_cases
 from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import ProfileError, load_profile
-from protocol.conformance.pytest.fixture import PTY, pty_stand_in
+from protocol.conformance.pytest.fixture import PTY, pty_emulator
 from protocol.conformance.session.suite import Session, session_at
 from protocol.interrupts import ended_by_signals
 
 
 @pytest.fixture(scope="module")
 def session(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
-    """A session with the table at `--table-port`; it ends with the table at rest where it was."""
+    """A session with the table at `--table-port`. At its end the table rests at its start position."""
     url, control = str(pytestconfig.getoption("--table-port")), pytestconfig.getoption("--table-control")
     may_move = pytestconfig.getoption("--table-yes") or url == PTY
     with ExitStack() as stack:
         if url == PTY:
-            url, control = stack.enter_context(pty_stand_in(tmp_path_factory.mktemp("table")))
+            url, control = stack.enter_context(pty_emulator(tmp_path_factory.mktemp("table")))
         try:
             profile = load_profile(pytestconfig.getoption("--table-profile"))
             port = open_port(url, profile)
             stack.callback(port.close)
             stack.enter_context(ended_by_signals())
             if not may_move and not is_simulated(port):
-                pytest.exit(f"the table at {url} will turn {profile.motion}; say --table-yes if it may", returncode=2)
+                pytest.exit(
+                    f"the table at {url} will turn {profile.motion}; add --table-yes to allow this", returncode=2
+                )
             stand = stand_beside(port, control, profile)
             watch = stack.enter_context(watch_in(simulated=is_simulated(port)))
             one = session_at(url, RecordedPort(port), profile, stand, watch=watch)
@@ -48,10 +50,10 @@ def session(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactor
 def test_clause(
     session: Session, case: Case, record_testsuite_property: Callable[[str, object], None], pytestconfig: pytest.Config
 ) -> None:
-    """Hold the table against one clause."""
+    """Test the table against one clause."""
     outcome = session.run_case(case)
     for measurement in outcome.measurements:
-        # Of the suite, as xunit2 has it: there a single test has no properties.
+        # This belongs to the suite in the xunit2 format: a single test has no properties there.
         record_testsuite_property(f"{case.id}: {measurement.name}", f"{measurement} {measurement.verdict}")
     if outcome.verdict is Verdict.SKIPPED:
         pytest.skip(outcome.reason)

@@ -1,1 +1,1 @@
-"""What a session has seen: record, report, and the replay of a record."""
+"""Results of a session: record, report, and the replay of a record."""

@@ -1,4 +1,4 @@
-"""The record of a session: one JSON file that says all, and JUnit's XML for machines that count tests."""
+"""The record of a session: one complete JSON file, and JUnit XML for machines that count tests."""
 
 import json
 import math
@@ -24,17 +24,20 @@ VERSION = 1
 
 _WAYS: tuple[Literal["sent", "received", "beside"], ...] = ("sent", "received", "beside")
 _UNWRITABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
-"""What UTF-8 or XML cannot hold; the name of a device can, as any byte that is not a zero or a slash may be in it."""
+"""Characters that UTF-8 or XML cannot hold.
+
+A device name can contain them, because it may contain any byte except zero and slash.
+"""
 _DEED = re.compile(rb"reopen|trigger|power_cycle|preset -?[0-9]{1,10}")
 
 
 class RecordError(ValueError):
-    """A file that is no record, or one of another version; the message names the file."""
+    """A file that is not a record, or a record of another version. The message names the file."""
 
 
 @dataclass(frozen=True)
 class Header:
-    """What was tested, when, with what."""
+    """What was tested, when, and with which software."""
 
     device: str
     profile: Profile
@@ -42,12 +45,12 @@ class Header:
     home_deg: int
     capabilities: Sequence[str]
     begun: str | None
-    """Date and time; None in simulated time, where a run has none and gives the same record each time."""
+    """Date and time. None in simulated time, so that each run gives the same record."""
 
 
 @dataclass(frozen=True)
 class RecordedCase:
-    """What a record holds of one case: enough to send it again."""
+    """The part of a record for one case: enough to send it again."""
 
     id: str
     wire: tuple[Event, ...]
@@ -55,7 +58,7 @@ class RecordedCase:
 
 @dataclass(frozen=True)
 class Record:
-    """A record that was read back."""
+    """A record that was read from a file."""
 
     profile: Profile
     home_deg: int
@@ -63,7 +66,7 @@ class Record:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of all that took part."""
+    """Return the versions of all software involved."""
     found = {"python": platform.python_version(), "system": platform.platform()}
     for package in ("seventh-axis", "pyserial", "hypothesis"):
         try:
@@ -74,13 +77,13 @@ def versions() -> dict[str, str]:
 
 
 def count_verdicts(outcomes: Iterable[Outcome]) -> dict[Verdict, int]:
-    """Return how many cases ended in each way, those that never occurred left out."""
+    """Return how many cases ended with each verdict, without verdicts that did not occur."""
     ends = [outcome.verdict for outcome in outcomes]
     return {verdict: ends.count(verdict) for verdict in Verdict if verdict in ends}
 
 
 def write_record(path: Path, header: Header, outcomes: Sequence[Outcome]) -> None:
-    """Write `record.json`; it appears under its name when it is whole."""
+    """Write `record.json`. The file appears under its name when it is complete."""
     record = {
         "format": FORMAT,
         "version": VERSION,
@@ -98,19 +101,19 @@ def write_record(path: Path, header: Header, outcomes: Sequence[Outcome]) -> Non
 
 
 def read_record(path: Path) -> Record:
-    """Return a record for sending it again.
+    """Return a record for a replay.
 
     Raises:
-        RecordError: the file cannot be read, or is no record of this version.
+        RecordError: the file cannot be read, or is not a record of this version.
     """
     try:
         record = read_json(path)
     except DataFileError as error:
         raise RecordError(str(error)) from error
     if not isinstance(record, dict) or record.get("format") != FORMAT:
-        raise RecordError(f"{path}: is no {FORMAT}")
+        raise RecordError(f"{path}: is not a {FORMAT}")
     if record.get("version") != VERSION:
-        raise RecordError(f"{path}: is of version {record.get('version')!r}; this program reads version {VERSION}")
+        raise RecordError(f"{path}: has version {record.get('version')!r}; this program reads version {VERSION}")
     try:
         cases = tuple(
             RecordedCase(case["id"], tuple(_event(*event) for event in case["wire"])) for case in record["cases"]
@@ -123,7 +126,10 @@ def read_record(path: Path) -> Record:
 
 
 def write_junit(path: Path, header: Header, outcomes: Sequence[Outcome], durations_s: Sequence[float]) -> None:
-    """Write the verdicts as JUnit's XML, with the real duration of each case; it appears under its name when whole."""
+    """Write the verdicts as JUnit XML, with the real duration of each case.
+
+    The file appears under its name when it is complete.
+    """
     counts = count_verdicts(outcomes)
     numbers = {"tests": len(outcomes), "failures": counts.get(Verdict.FAIL, 0), "errors": counts.get(Verdict.ERROR, 0)}
     suite = ET.Element(
@@ -151,33 +157,33 @@ def write_junit(path: Path, header: Header, outcomes: Sequence[Outcome], duratio
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a file under a temporary name and give it its own when it is whole; unwritable characters are escaped.
+    """Write a file under a temporary name, and rename it when it is complete. Unwritable characters are escaped.
 
     Raises:
-        OSError: it cannot be written; nothing is left of it.
+        OSError: the file cannot be written; nothing remains of it.
     """
     partial = path.with_name(path.name + ".part")
     try:
-        partial.unlink(missing_ok=True)  # of a run that was killed
+        partial.unlink(missing_ok=True)  # left by an interrupted run
         with partial.open("x", encoding="utf-8") as file:
             file.write(_UNWRITABLE.sub(_escaped, text))
         partial.replace(path)
     except OSError as error:
         with suppress(OSError):
             partial.unlink()
-        raise OSError(f"{path}: cannot be written: {error.strerror}") from error
+        raise OSError(f"{path}: cannot write: {error.strerror}") from error
 
 
 def _event(time_s: object, way: object, data: str) -> Event:
-    """Return an event as it was recorded, or raise ValueError: a table is to be moved by it."""
+    """Return an event as it was recorded, or raise ValueError: a table will be moved according to it."""
     if not isinstance(time_s, int | float) or not math.isfinite(time_s):
-        raise ValueError(f"{time_s!r} is no time")
+        raise ValueError(f"{time_s!r} is not a time")
     known = next((one for one in _WAYS if one == way), None)
     if known is None:
-        raise ValueError(f"{way!r} is none of {', '.join(_WAYS)}")
+        raise ValueError(f"{way!r} is not one of {', '.join(_WAYS)}")
     event = Event(time_s, known, data.encode("latin-1"))
     if known == "beside" and not _DEED.fullmatch(event.data):
-        raise ValueError(f"{data!r} is nothing that is done beside the wire")
+        raise ValueError(f"{data!r} is not an action of the rig")
     return event
 
 

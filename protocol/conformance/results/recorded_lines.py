@@ -1,4 +1,4 @@
-"""The wire of a record as lines, at the times at which they reach the table that it is sent to; no I/O."""
+"""The recorded traffic as lines, with the times at which they reach the table of the replay; no I/O."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -14,11 +14,11 @@ _SPACES = re.compile(rb" +")
 
 
 class Line(NamedTuple):
-    """A line without its CR, at the time at which that arrives; or a deed beside the wire, which has no text.
+    """A line without its CR, at the arrival time of the CR; or an action of the rig, which has no text.
 
-    The deed `BEGIN` begins a case, whether lines follow or not.
+    The action `BEGIN` starts a case, with or without lines.
 
-    A line is whole when its beginning cannot have been forgotten by a table that saw its client go.
+    A line is whole when a table that detects a disconnect cannot have discarded its start.
     """
 
     case: str
@@ -29,9 +29,9 @@ class Line(NamedTuple):
 
 
 def recorded_lines(cases: Iterable[RecordedCase], profile: Profile) -> Iterator[Line]:
-    """Yield lines and deeds in their order; times count from the beginning of the replay."""
+    """Yield lines and actions in order. Times count from the start of the replay."""
     begin_s = free_s = 0.0
-    half = forgotten = b""  # of a line; and the part before the client left, or canceled it
+    half = forgotten = b""  # the start time of a line; and the part before the client disconnected or canceled it
     for case in cases:
         now_s, origin_s = begin_s, case.wire[0].time_s
         forgotten, half = forgotten + half, b""  # the replay cancels it
@@ -55,9 +55,9 @@ def recorded_lines(cases: Iterable[RecordedCase], profile: Profile) -> Iterator[
 
 
 def crowded_lines(case: RecordedCase, profile: Profile) -> Iterator[list[bytes]]:
-    """Yield the lines that are sent without waiting for a reply, where they are more bytes than a table must hold.
+    """Yield the lines that are sent without waiting for a reply, if they exceed the minimum buffer of a table.
 
-    Of those a table may lose some, and make one line of two.
+    A table may lose some of these bytes, and join two lines into one.
     """
     sent = b""
     for event in (*case.wire, None):

@@ -1,4 +1,4 @@
-"""Send the wire of a record to another table, and see where the answers part."""
+"""Send the recorded traffic to another table, and compare the replies."""
 
 import re
 from collections.abc import Sequence
@@ -13,12 +13,12 @@ from protocol.messages import ANGLE_LETTERS
 
 _ANGLE = re.compile(rf"([{ANGLE_LETTERS}]) (-?[0-9]+\.[0-9]+)".encode())
 AFTER_S = 0.3
-"""From the last event of a case until the next case begins."""
+"""Time from the last event of a case to the start of the next case."""
 _MOMENT_S = 0.001
 
 
 class Parting(NamedTuple):
-    """The first reply of a case that differs: its place among the replies, and both readings of it."""
+    """The first differing reply of a case: its index, and both replies."""
 
     reply: int
     time_s: float
@@ -31,10 +31,10 @@ class Parting(NamedTuple):
 
 
 def replay(case: RecordedCase, wire: Wire, stand: Stand, profile: Profile) -> Parting | None:
-    """Send what was sent, at the times at which it was, and return the first reply that is another.
+    """Send the recorded bytes at their recorded times, and return the first differing reply.
 
-    An angle is the same when it differs by no more than the tolerance of a table in motion, and by what it turns within
-    the latency.
+    Two angles are equal if they differ by at most the tolerance of a table in motion plus its travel within the
+    latency.
     """
     if not case.wire:
         return None
@@ -47,7 +47,7 @@ def replay(case: RecordedCase, wire: Wire, stand: Stand, profile: Profile) -> Pa
         heard += wire.listen(event.time_s - origin_s - (wire.clock.now_s() - begin_s))
         latest_s = wire.clock.now_s() + profile.serial.latency_s
         while event.direction == "beside" and heard.count(CR) < due and wire.clock.now_s() < latest_s:
-            heard += wire.listen(_MOMENT_S)  # a table that is switched off now would lose what had come by now then
+            heard += wire.listen(_MOMENT_S)  # a power cycle would discard replies that the record has
         _do(event, wire, stand)
     heard += wire.listen(case.wire[-1].time_s - origin_s - (wire.clock.now_s() - begin_s) + AFTER_S)
     tolerance = profile.tolerance.tracking_deg + profile.resolution_deg

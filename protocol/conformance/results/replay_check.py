@@ -1,8 +1,8 @@
-"""What a recorded wire would do to this table, decoded before any of it is sent.
+"""Decode recorded traffic and check its effect on this table, before any of it is sent.
 
-A record is made to be passed on, so it is not trusted. Its lines are followed as this table would carry them out, with
-its own limits and from where it stands. Where it is open what the table does, everything that it may do has to fit:
-a line that it must refuse may be read by a table of wider grammar, a command may come late, bytes may be lost.
+A record may come from anyone, so it is not trusted. Its lines are followed as this table would execute them, with its
+own limits and from its own position. Where several courses are possible, all of them must be allowed: a table with a
+wider grammar may execute a line that it must refuse, a command may be late, bytes may be lost.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,17 +16,17 @@ from protocol.messages import Command, Verb
 from protocol.trapezoid import Motion, MotionCommand, ReferenceState
 
 _DELAYS = ((0.0,), (1.0,), (0.0, 1.0), (1.0, 0.0))
-"""How late the commands may be carried out, in turn, as a share of what adapter and scheduler may add."""
+"""Delays of the commands in turn, as a share of the delay that adapter and scheduler may add."""
 _LATE_S = 0.005
 _MOST_COURSES = 500
 _MOST_PLACES = 9
 _MOST_CROWDED = 40
 _SLACK_DEG = 1e-6
-_NOTHING_KNOWN = "leaves it open how the table moves"
+_NOTHING_KNOWN = "leaves the motion of the table undetermined"
 
 
 class Misfit(NamedTuple):
-    """A line that may not be sent to this table, and why."""
+    """A line that must not be sent to this table, and the reason."""
 
     case: str
     line: bytes
@@ -37,14 +37,14 @@ class Misfit(NamedTuple):
 
 
 def check(cases: Sequence[RecordedCase], home_deg: float, profile: Profile) -> Misfit | list[float]:
-    """Return the first line that may move this table farther, faster or harder than its profile allows.
+    """Return the first line that may move this table farther, faster or with more acceleration than its profile allows.
 
-    Where there is none, return for each case where the table stands when it begins.
+    If there is none, return the position of the table at the start of each case.
 
     Args:
-        cases: what is to be sent, in this order.
-        home_deg: where the table stands.
-        profile: of this table.
+        cases: the cases to send, in this order.
+        home_deg: present position of the table.
+        profile: profile of this table.
     """
     for case in cases:
         if found := _glued_misfit(case, home_deg, profile):
@@ -58,36 +58,36 @@ def check(cases: Sequence[RecordedCase], home_deg: float, profile: Profile) -> M
 
 
 class _Course(NamedTuple):
-    """A motion that the table may be in; its angles count from where the table stood at first."""
+    """A possible motion of the table. Its angles count from the first position of the table."""
 
     motion: Motion
     began_s: float
 
     def at(self, time_s: float) -> ReferenceState:
-        """Return position and speed, rounded so that courses meet again where they rest."""
+        """Return position and speed, rounded so that courses merge when they rest at the same place."""
         position, speed = self.motion.at(time_s - self.began_s)
         return ReferenceState(round(position, 6), round(speed, 6))
 
 
 class _Walk:
-    """The courses that a table may take along the lines.
+    """The possible courses of a table that receives the lines.
 
     Attributes:
-        starts_deg: where the table stands when each case begins.
+        starts_deg: position of the table at the start of each case.
     """
 
     def __init__(self, home_deg: float, profile: Profile, delays: Sequence[float]) -> None:
-        """Begin at rest; `delays` are those of the lines, in turn."""
+        """Start at rest; `delays` are the delays of the lines, in turn."""
         self._profile, self._delays = profile, delays
         self._late_s = profile.serial.latency_s + _LATE_S
-        self._zero_deg = -home_deg  # of the register, from where the table stood
-        self._lawful = _resting(0.0, 0.0)  # the course of a table that refuses what it must
+        self._zero_deg = -home_deg  # value of the register at the first position of the table
+        self._lawful = _resting(0.0, 0.0)  # the course of a table that refuses what it must refuse
         self._courses = {self._lawful}
         self._set(profile.motion.speed_deg_s, profile.motion.acceleration_deg_s2)
         self.starts_deg: list[float] = []
 
     def take(self, lines: Sequence[Line]) -> Misfit | None:
-        """Follow the lines, and return the first that does not fit."""
+        """Follow the lines, and return the first one that violates the profile."""
         for index, line in enumerate(lines):
             late_s = self._late_s * self._delays[index % len(self._delays)]
             reason = self._deed(line) if line.deed else self._line(line._replace(time_s=line.time_s + late_s))
@@ -96,7 +96,7 @@ class _Walk:
         return None
 
     def _begin_case(self, time_s: float) -> None:
-        """Begin at rest: before a case the replay sees that the table stands where it should, and sets S and A."""
+        """Start at rest: before each case, the replay checks the position of the table, and sets S and A."""
         position = self._lawful.motion.target_deg
         self.starts_deg.append(position - self._zero_deg)
         self._lawful = _resting(position, time_s)
@@ -105,10 +105,10 @@ class _Walk:
 
     def _set(self, top_deg_s: float, rate_deg_s2: float) -> None:
         self._top, self._rate = top_deg_s, rate_deg_s2
-        self._tops, self._rates = {top_deg_s}, {rate_deg_s2}  # with those that a line which must be refused may set
+        self._tops, self._rates = {top_deg_s}, {rate_deg_s2}  # including the settings from lines that must be refused
 
     def _line(self, line: Line) -> str:
-        """Take a line, and return what is wrong with it, or nothing."""
+        """Follow a line, and return its violation, or an empty text."""
         command = certain_command(line.text) if line.is_whole else None
         if command is not None and not self._must_refuse(command):
             return self._certain(command, line.time_s)
@@ -116,7 +116,7 @@ class _Walk:
         return next((reason for each in readings if (reason := self._possible(each, line.time_s))), "")
 
     def _certain(self, command: Command, time_s: float) -> str:
-        """Take a command that every table of this protocol carries out."""
+        """Follow a command that every table of this protocol executes."""
         if command.value is None:
             return ""
         value, allowed = float(command.value), self._profile.motion
@@ -131,7 +131,7 @@ class _Walk:
         return self._wrong()
 
     def _possible(self, command: Command, time_s: float) -> str:
-        """Take a command that this table has to refuse, and another may carry out."""
+        """Follow a command that this table must refuse but another may execute."""
         value = float(command.value or 0)
         if command.verb is Verb.SET_SPEED:
             self._tops |= {value} if value > 0.0 else set()
@@ -165,16 +165,16 @@ class _Walk:
         return _Course(Motion.of(state, MotionCommand(target, top_deg_s, rate_deg_s2)), time_s)
 
     def _states(self, time_s: float) -> list[ReferenceState]:
-        """Return where the table may be, and at what speed; of many places at which it may rest only some."""
+        """Return the possible positions and speeds of the table. Of many rest positions, only some are returned."""
         states = {course.at(time_s) for course in self._courses}
         resting = sorted(state for state in states if not state[1])
-        if len(resting) > _MOST_PLACES:  # the first and the last among them
+        if len(resting) > _MOST_PLACES:  # the first and the last of them
             share = (len(resting) - 1) / (_MOST_PLACES - 1)
             resting = [resting[round(index * share)] for index in range(_MOST_PLACES)]
         return [*resting, *(state for state in states if state[1])]
 
     def _wrong(self) -> str:
-        """Return what is wrong with the motions that are possible now, or nothing."""
+        """Return the violation by the motions that are possible now, or an empty text."""
         allowed = self._profile.motion
         if len(self._courses) > _MOST_COURSES:
             return _NOTHING_KNOWN
@@ -196,7 +196,7 @@ class _Walk:
         return self._leaves_the_counter(command)
 
     def _leaves_the_counter(self, command: Command) -> bool:
-        """Return whether a counter like this table's cannot hold the target, or half the way there (4.4/2, 4.4/3)."""
+        """Return whether a counter like this table's cannot hold the target, or half of the travel (4.4/2, 4.4/3)."""
         if command.verb not in {Verb.MOVE_TO, Verb.MOVE_BY}:
             return False
         value, range_deg = float(command.value or 0), self._profile.range_deg
@@ -205,9 +205,9 @@ class _Walk:
         return abs(value) > range_deg or min(ways) > range_deg
 
     def _deed(self, line: Line) -> str:
-        """Take the begin of a case, or what is done beside the wire: the table is switched off and on.
+        """Follow the start of a case, or an action of the rig: the table is switched off and on.
 
-        Then it calls its place another number.
+        Then the table reports another angle at the same place.
         """
         if line.deed == BEGIN:
             self._begin_case(line.time_s)
@@ -229,7 +229,7 @@ class _Walk:
 
 
 def _glued_misfit(case: RecordedCase, home_deg: float, profile: Profile) -> Misfit | None:
-    """Return a line that may come about where bytes are lost, and may not be carried out from anywhere."""
+    """Return a line that may result from lost bytes and must not be executed from any position."""
     allowed = profile.motion
     for lines in crowded_lines(case, profile):
         if len(lines) > _MOST_CROWDED:
@@ -239,12 +239,12 @@ def _glued_misfit(case: RecordedCase, home_deg: float, profile: Profile) -> Misf
                 value = abs(float(command.value or 0) - (home_deg if command.verb is Verb.MOVE_TO else 0.0))
                 most = {Verb.SET_SPEED: allowed.speed_deg_s, Verb.SET_ACCELERATION: allowed.acceleration_deg_s2}
                 if value > most.get(command.verb, allowed.reach_deg):
-                    return Misfit(case.id, line, "may come about where bytes are lost, and is beyond the profile")
+                    return Misfit(case.id, line, "may result from lost bytes, and violates the profile")
     return None
 
 
 def _turning_points(motion: Motion) -> Iterator[float]:
-    """Yield the angles at the ends of a motion's segments: it goes nowhere beyond them."""
+    """Yield the angles at the ends of a motion's phases: the motion does not pass them."""
     time_s = 0.0
     yield motion.start.angle_deg
     for segment in motion.segments:

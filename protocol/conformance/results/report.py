@@ -1,4 +1,4 @@
-"""The report: one HTML page for an engineer to read and to send on."""
+"""The report: one HTML page."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -35,11 +35,14 @@ _BAD = {Verdict.FAIL, Verdict.ERROR}
 _EMPHASIS = re.compile(r"\*([^*]+)\*")
 
 Repeat = Callable[[Case], str]
-"""Returns the command that repeats a case alone."""
+"""Returns the command that repeats one case."""
 
 
 def write_report(path: Path, header: Header, outcomes: Sequence[Outcome], repeat: Repeat, command: str = "") -> None:
-    """Write the report; it appears under its name when it is whole. `command` is the command line that asks for it."""
+    """Write the report.
+
+    The file appears under its name when it is complete. `command` is the command line that made it.
+    """
     counts = count_verdicts(outcomes)
     sums = "".join(f'<div class="sum"><b>{count}</b>{ended}</div>' for ended, count in counts.items())
     strip = "".join(
@@ -65,7 +68,7 @@ def write_report(path: Path, header: Header, outcomes: Sequence[Outcome], repeat
 
 
 def _headline(outcomes: Sequence[Outcome]) -> str:
-    """Return how many cases failed, and which measurement was nearest to its limit, or farthest beyond."""
+    """Return the number of failed cases, and the measurement nearest to its limit or farthest beyond it."""
     failed = sum(outcome.verdict in _BAD for outcome in outcomes)
     text = f"{failed} of {counted(len(outcomes), 'case')} failed."
     bounded = [(one.margin, outcome, one) for outcome in outcomes for one in outcome.measurements if one.margin < inf]
@@ -97,7 +100,7 @@ def _facts(header: Header, outcomes: Sequence[Outcome]) -> list[tuple[str, str]]
 
 
 def _failed(outcomes: Sequence[Outcome]) -> str:
-    """Return what failed, each with its reason and a link to it."""
+    """Return the failed cases, each with its reason and a link to it."""
     rows = "".join(
         f'<li><a href="#{outcome.case.id}"><code>{outcome.case.id}</code></a><span>{escape(outcome.reason)}</span></li>'
         for outcome in outcomes
@@ -149,7 +152,7 @@ def _measurements(measurements: Sequence[Measurement]) -> str:
 
 
 def _motion_plot(motion: MotionRecord) -> str:
-    """Return position and speed, expected and seen, over the time since the first command."""
+    """Return expected and measured position and speed, over the time since the first command."""
     samples, expectations = motion.samples, motion.expectations
     begin_s = min(samples[0].time_s, expectations[min(1, len(expectations) - 1)].began_s)
     end_s = samples[-1].time_s
@@ -177,7 +180,7 @@ def _motion_plot(motion: MotionRecord) -> str:
 
 
 def _wire(events: Sequence[Event]) -> str:
-    """Return what passed: a command and its reply, when nothing came between them, in one row."""
+    """Return the traffic. A command and its reply share a row if nothing came between them."""
     begin_s, rows, index = events[0].time_s, [], 0
     while index < len(events):
         event = events[index]
@@ -203,7 +206,7 @@ def _shown(data: bytes) -> str:
 
 
 def _marked(text: str) -> str:
-    """Return a sentence of the specification with its `code` and its *figures* marked up."""
+    """Return a sentence of the specification with its `code` and its *figures* as markup."""
     pieces = escape(text, quote=False).split("`")
     return "".join(
         f"<code>{piece}</code>" if index % 2 else _EMPHASIS.sub(r"<em>\1</em>", piece)

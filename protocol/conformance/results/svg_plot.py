@@ -1,4 +1,4 @@
-"""Small plots as SVG text, without any library."""
+"""Small SVG plots, without a library."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ _WIDTH, _PANEL, _LEFT, _RIGHT, _GAP, _BOTTOM = 760, 150, 58, 12, 16, 34
 
 
 class Panel(NamedTuple):
-    """One pair of axes: a line that was expected, and dots that were seen."""
+    """One pair of axes: a line of expected values, and dots of measured values."""
 
     label: str
     line: Points
@@ -19,7 +19,7 @@ class Panel(NamedTuple):
 
 
 def plot(panels: Sequence[Panel], x_label: str, alt: str) -> str:
-    """Return panels one below the other, over the same x; `alt` describes them to those who cannot see them."""
+    """Return panels one below the other with the same x axis; `alt` is the text alternative."""
     x_low, x_high = _extent([x for panel in panels for x, _ in (*panel.line, *panel.dots)])
     height = len(panels) * (_PANEL + _GAP) + _BOTTOM
     parts = [f'<svg class="plot" viewBox="0 0 {_WIDTH} {height}" role="img" aria-label="{escape(alt)}">']
@@ -36,7 +36,7 @@ def plot(panels: Sequence[Panel], x_label: str, alt: str) -> str:
 
 
 def range_bar(value: float, least: float | None, most: float | None, verdict: str) -> str:
-    """Return a bar for a range, with a mark where a value lies in it or beside it."""
+    """Return a bar for a range, with a mark at a value inside or outside of it."""
     low = least if least is not None else min(0.0, value) if most is None or most >= 0 else 2 * most
     high = most if most is not None else 2 * low if low > 0 else max(1.0, 2 * value)
     share = min(max((value - low) / (high - low) if high > low else 0.5, -0.1), 1.1)
@@ -84,7 +84,7 @@ def _scaled(value: float, low: float, high: float, first: float, last: float) ->
 
 
 def _ticks(low: float, high: float, most: int) -> list[float]:
-    """Return round values within an extent, `most` of them at most."""
+    """Return at most `most` round values within an extent."""
     rough = (high - low) / most
     power = 10.0 ** math.floor(math.log10(rough))
     step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= rough)

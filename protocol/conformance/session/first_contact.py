@@ -1,4 +1,4 @@
-"""The first question to a table: where does it rest, and is it a table at all?"""
+"""The first command to a table: check that it is a table of this protocol, and read its rest position."""
 
 import re
 from decimal import Decimal
@@ -9,25 +9,25 @@ from protocol.conformance.bench.wire import Wire
 from protocol.conformance.profile.profile import Profile
 
 CANCEL = b"\x18\r"
-"""Ends whatever half line a table holds, in such a way that it is not carried out (clause 8.3/1)."""
+"""Ends an incomplete line at the table without executing it (clause 8.3/1)."""
 
 SETTLE_S = 0.3
-"""Beyond the latency, a line on which nothing has come for so long is empty."""
+"""A line is empty when it has been silent for this time plus the latency."""
 
 PATIENCE_S = 30.0
-"""How long a busy machine is given to calm down, and a table that is stopped to fall silent."""
+"""Time allowed for a busy machine to calm down, and for a stopped table to fall silent."""
 
 _TALK_S = 10.0
-"""How long a table may go on with its replies to whoever was there before."""
+"""Time for which a table may continue with its replies to an earlier client."""
 
 _POSITION = re.compile(rb"(?:^|[\r\n])H (-?[0-9]+\.[0-9]+) *\r")
 
 
 def resting_position(wire: Wire, profile: Profile, watch: Watch) -> Decimal:
-    """Return where the table rests; a machine that was late is given a second chance to hear it.
+    """Return the rest position of the table. If the testing machine was late, try a second time.
 
     Raises:
-        SessionError: what is at the port does not answer, is no table of this protocol, or is in motion.
+        SessionError: the device at the port does not reply, is not a table of this protocol, or is moving.
     """
     watch.restart()
     try:
@@ -43,7 +43,7 @@ def _asked(wire: Wire, profile: Profile) -> Decimal:
     wire.send(CANCEL)
     quiet_s = SETTLE_S + profile.serial.latency_s
     if wire.drain(quiet_s, _TALK_S) and (chatter := wire.listen(quiet_s)):
-        raise SessionError(f"talks without being asked: {chatter[:40]!r}...; this is no table of this protocol")
+        raise SessionError(f"sends without a command: {chatter[:40]!r}...; this is not a table of this protocol")
     before, after = _reading(wire, profile), _reading(wire, profile)
     if before != after:
         raise SessionError(f"the table moves ({before}, then {after} deg); stop it first")
@@ -51,7 +51,7 @@ def _asked(wire: Wire, profile: Profile) -> Decimal:
 
 
 def _reading(wire: Wire, profile: Profile) -> Decimal:
-    """Return a position, and let some time pass."""
+    """Return a position, and wait for some time."""
     timeout_s = profile.serial.timeout_s
     wire.send(b"H\r")
     line = wire.read_line(timeout_s)
@@ -59,10 +59,10 @@ def _reading(wire: Wire, profile: Profile) -> Decimal:
     found = _POSITION.search(heard)
     if not heard:
         raise SessionError(
-            f"no answer to 'H' within {timeout_s:g} s; is the table on, the cable right, "
-            f"and its rate {profile.serial.baud} baud?"
+            f"no reply to 'H' within {timeout_s:g} s; check the power of the table, the cable, "
+            f"and the baud rate (here {profile.serial.baud})"
         )
     if found is None:
-        raise SessionError(f"'H' got {heard!r}, which is no position; this is no table of this protocol")
+        raise SessionError(f"'H' got {heard!r}, which is not a position; this is not a table of this protocol")
     wire.clock.sleep_s(SETTLE_S)
     return Decimal(found[1].decode())

@@ -1,4 +1,4 @@
-"""A session with a table: from rest, case after case, back to rest."""
+"""A session with a table: run the cases one after the other, each from rest to rest."""
 
 import traceback
 from collections.abc import Callable, Iterable, Sequence
@@ -23,16 +23,16 @@ from protocol.errors import TableError
 __all__ = ["Outcome", "Session", "SessionError", "session_at"]
 
 _RUNS = 5
-"""How often a case is run when its machine spoils it."""
+"""How often a case is run when the testing machine was late."""
 _START_DEG = 0.75
-"""A recorded case begins within this of its place: it may begin half a degree from a whole one."""
+"""Tolerance of the start position of a recorded case, which may be half a degree from a whole number."""
 _LONGEST_REASON = 1000
-"""Of a reason that is longer, beginning and end are kept: a table may say anything."""
+"""A longer reason is cut in the middle: a table may send anything."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a case ended; `spoiled` says of each run before that one how it failed on a machine that was late."""
+    """How a case ended. `spoiled` states for each earlier run how it failed on a machine that was late."""
 
     case: Case
     verdict: Verdict
@@ -45,17 +45,17 @@ class Outcome:
 
 
 class Session:
-    """The suite's hold on one table, from the first question until it stands where it stood.
+    """Access of the suite to one table, from the first command until the table is back at its start position.
 
     Attributes:
-        capabilities: what cases may need and what there is.
-        profile: what is known of the table, with what the rig can ask it itself.
-        home_deg: where the session began, and each moving case begins.
-        is_stopped: whether the table was seen to rest when it was stopped last.
-        how_it_was_left: the same in words, and where it stands or what it will do.
+        capabilities: the available capabilities that cases may need.
+        profile: properties of the table, including those that the rig can read from it.
+        home_deg: position at the start of the session. Each moving case starts there.
+        is_stopped: whether standstill was observed after the last stop.
+        how_it_was_left: the same as text, with the position of the table or what it will do.
 
     Raises:
-        SessionError: what is at the port does not answer, is no table of this protocol, or is in motion.
+        SessionError: the device at the port does not reply, is not a table of this protocol, or is moving.
     """
 
     def __init__(
@@ -74,9 +74,11 @@ class Session:
         self._was_left = False
 
     def run(self, cases: Iterable[Case], report: Callable[[Outcome], None] = lambda _: None) -> list[Outcome]:
-        """Run cases one after the other, and bring the table home; what breaks into it, as Ctrl-C, stops the table.
+        """Run cases one after the other, and return the table to its home position.
 
-        A table that was stopped so is left where it stands.
+        An interrupt such as Ctrl-C stops the table.
+
+        After such a stop, the table stays where it is.
         """
         outcomes = []
         try:
@@ -90,9 +92,9 @@ class Session:
         return outcomes
 
     def run_case(self, case: Case) -> Outcome:
-        """Run one case and leave the table at rest; where this machine was late, a failure is run again.
+        """Run one case and leave the table at rest. If this machine was late, a failed case is run again.
 
-        What breaks into it stops the table, as in `run`.
+        An interrupt stops the table, as in `run`.
         """
         lacking = self._lacking(case)
         if lacking:
@@ -129,12 +131,12 @@ class Session:
         return Outcome(case, verdict, reason, tuple(rig.measurements), motion, events, seconds)
 
     def stop(self) -> None:
-        """Stop the table where it is, whatever is on the line, if it still answers."""
+        """Stop the table where it is, whatever the line contains, if it still replies."""
         serial, motion = self.profile.serial, self.profile.motion
         self._is_home = self.is_stopped = False
         try:
             client = TableClient(self._port, serial.timeout_s, serial.decimals, motion.acceleration_deg_s2)
-            self.how_it_was_left = f"the table was stopped, and stands at {client.stop():.6g} deg"
+            self.how_it_was_left = f"the table was stopped and stands at {client.stop():.6g} deg"
             self.is_stopped = True
         except TableError as error:
             self.how_it_was_left = str(error)
@@ -142,10 +144,10 @@ class Session:
             self._wire.drain(SETTLE_S + serial.latency_s, PATIENCE_S)
 
     def begin_replay(self, case: str, start_deg: float) -> None:
-        """Set S and A to the profile's greatest before a recorded case, and see that the table rests where it should.
+        """Set S and A to the profile's maximum before a recorded case, and check the start position of the table.
 
         Raises:
-            SessionError: it does not, or it does not answer as it should.
+            SessionError: the table is at another position, or it gives a wrong reply.
         """
         rig = self._rig("replay")
         self._wire.send(CANCEL)
@@ -158,11 +160,11 @@ class Session:
         if abs(position_deg - start_deg) > _START_DEG:
             raise SessionError(
                 f"before case {case} the table is at {position_deg:g} deg and should be at {start_deg:g}:"
-                " it carried out what it has to refuse"
+                " it executed a command that it must refuse"
             )
 
     def end(self) -> None:
-        """Stop the table, and bring it back to where the session began, unless something broke into the session."""
+        """Stop the table, and return it to the start position of the session, unless an interrupt ended the session."""
         if self._was_left:
             return
         self.stop()
@@ -179,11 +181,11 @@ class Session:
         self._is_home = True
 
     def _rig(self, purpose: str) -> Rig:
-        chance = Random(f"{self._seed} {purpose}")  # noqa: S311  # no secret
+        chance = Random(f"{self._seed} {purpose}")  # noqa: S311  # not for security
         return Rig(self._wire, self.profile, self._stand, self.home_deg, chance, self._watch)
 
     def _judged(self, case: Case, rig: Rig) -> tuple[Verdict, str]:
-        """Return verdict and reason of a case, with the table stopped and its line empty where it failed."""
+        """Return verdict and reason of a case. After a failure, the table is stopped and its line is empty."""
         try:
             if case.travel_deg:
                 if not self._is_home:
@@ -203,13 +205,13 @@ class Session:
             return Verdict.ERROR, str(error)
         except OSError as error:
             return Verdict.ERROR, f"{type(error).__name__}: {error}"
-        except Exception as error:  # a fault of the case itself ends that case alone
+        except Exception as error:  # an exception in a case ends only this case
             self._after_failure(case, rig)
             return Verdict.ERROR, "".join(traceback.format_exception_only(error)).strip()
         return _verdict_on(rig.measurements)
 
     def _lacking(self, case: Case) -> str:
-        """Return why a case cannot be run, or nothing."""
+        """Return why a case cannot be run, or an empty text."""
         waived = self.profile.waive.get(case.clause.number)
         if waived is not None:
             return f"waived by the profile: {waived}"
@@ -217,13 +219,13 @@ class Session:
         if lacking:
             return f"{' and '.join(lacking)} not available"
         if case.travel_deg > self.profile.motion.reach_deg:
-            return f"turns by {case.travel_deg:g} deg, the profile allows {self.profile.motion.reach_deg:g}"
+            return f"turns by {case.travel_deg:g} deg; the profile allows {self.profile.motion.reach_deg:g}"
         return ""
 
     def _restore(self, case: Case, rig: Rig) -> None:
-        """Leave the table at home for the next case; where a case moved the counter's zero, home is another number."""
+        """Leave the table at home for the next case. If a case moved the counter's zero, home has another angle."""
         if PRESET in case.needs:
-            self._stand.power_cycle()  # the table stands where it stood
+            self._stand.power_cycle()  # the table is where it was
             self.home_deg = 0
             return
         self.home_deg = rig.home_deg
@@ -235,7 +237,7 @@ class Session:
         self._recover(case)
 
     def _recover(self, case: Case) -> None:
-        """Stop the table and empty the line, whatever is on it, and bring it home."""
+        """Stop the table, empty the line, and return the table to its home position."""
         if PRESET in case.needs:
             try:
                 self._stand.power_cycle()
@@ -261,7 +263,7 @@ def _verdict_on(measurements: Sequence[Measurement]) -> tuple[Verdict, str]:
 def session_at(
     url: str, port: RecordedPort, profile: Profile, stand: Stand, seed: int = 0, watch: Watch | None = None
 ) -> Session:
-    """Begin a session; what is wrong with the table is told with the name of its port.
+    """Start a session. Messages about the table start with the name of its port.
 
     Raises:
         SessionError: see `Session`; or the port fails.
@@ -271,6 +273,4 @@ def session_at(
     except SessionError as error:
         raise SessionError(f"{url}: {error}") from error
     except OSError as error:
-        raise SessionError(
-            f"{url}: the port failed: {error}; check the table, and what is between it and here"
-        ) from error
+        raise SessionError(f"{url}: the port failed: {error}; check the table and its connection") from error

@@ -1,4 +1,4 @@
-"""A ratio as a float stands for the fraction that it was made of."""
+"""A ratio as a float represents the fraction from which it was computed."""
 
 from fractions import Fraction
 

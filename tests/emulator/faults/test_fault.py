@@ -1,4 +1,4 @@
-"""The catalog: what is a fault, by the same names and numbers everywhere."""
+"""The catalog of faults, with the same names and numbers everywhere."""
 
 import json
 import math
@@ -59,7 +59,7 @@ def test_the_three_ways_take_the_same_names_and_numbers(kind: str, tmp_path: Pat
 @pytest.mark.parametrize(
     ("kind", "numbers", "words"),
     [
-        ("gremlins", {}, "'gremlins' is not a fault; there are drop, "),
+        ("gremlins", {}, "'gremlins' is not a fault; allowed are drop, "),
         ("drop", {}, "drop: probability is missing; it must be a number from 0 to 1"),
         ("drop", {"probability": 2}, "drop: probability is 2; it must be a number from 0 to 1"),
         ("drop", {"probability": math.nan}, "drop: probability is nan"),
@@ -70,9 +70,9 @@ def test_the_three_ways_take_the_same_names_and_numbers(kind: str, tmp_path: Pat
         ),
         ("bounced-trigger", {"edges": 2.5, "within_s": 1}, "bounced-trigger: edges is 2.5; it must be a whole number"),
         ("stall", {"at_command": 1.5}, "stall: at_command is 1.5; it must be a whole number"),
-        ("stall", {"force": 2}, "stall: force is not known; it takes at_s, at_command, for_s"),
-        ("half-reply", {"bytes": 2, "for_s": 1}, "half-reply: for_s is not known"),
-        ("stall", {"at_s": 1, "at_command": 1}, "stall: at_s and at_command are two beginnings"),
+        ("stall", {"force": 2}, "stall: force is not a parameter; allowed are at_s, at_command, for_s"),
+        ("half-reply", {"bytes": 2, "for_s": 1}, "half-reply: for_s is not a parameter"),
+        ("stall", {"at_s": 1, "at_command": 1}, "stall: at_s and at_command are both given"),
     ],
 )
 def test_what_is_no_fault_is_refused_in_one_line(
@@ -90,7 +90,7 @@ def test_what_is_no_fault_is_refused_in_one_line(
 
 
 class Seen(NamedTuple):
-    """What a client and the state of the table show of a short session."""
+    """The observations of a client and of the table's state in a short session."""
 
     hung_up: bool
     replies: list[bytes]
@@ -120,12 +120,12 @@ def test_every_fault_has_an_effect(kind: str) -> None:
 
 
 class Gremlins(Fault, kind="gremlins"):
-    """Nothing goes wrong."""
+    """No fault."""
 
 
 def test_a_fault_without_effect_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fault, "KINDS", {**KINDS, Gremlins.kind: Gremlins})
-    with pytest.raises(FaultError, match=r"gremlins has no effect on this table; those that have are \w+"):
+    with pytest.raises(FaultError, match=r"gremlins has no effect on this table; allowed are \w+"):
         session_with(fault_from("gremlins", {}))
     with pytest.raises(FaultError, match="gremlins has no effect"):
         Table(replace(load_config(), faults=(fault_from("gremlins", {}),)))

@@ -1,4 +1,4 @@
-"""What a fault of the line does shows at the wire, and the client does about it what it should."""
+"""The effect of a fault of the line on the wire, and the reaction of the client."""
 
 import subprocess
 import sys
@@ -93,7 +93,7 @@ def test_a_port_that_hung_up_is_dead_until_it_returns_and_the_motion_goes_on(ben
     with pytest.raises(PortError):
         bench.client.position_deg()
     bench.port.close()
-    with pytest.raises(serial.SerialException, match="the device has gone"):
+    with pytest.raises(serial.SerialException, match="the device has disappeared"):
         bench.port.open()
     bench.client.clock.sleep_s(4)
     bench.port.open()
@@ -110,25 +110,25 @@ def test_at_a_wrong_rate_both_ends_hear_garbage(bench: Bench) -> None:
 
 
 @pytest.mark.realtime
-def test_a_pulled_port_comes_back_under_its_link(stand_in: Callable[..., Any], tmp_path: Path) -> None:
+def test_a_pulled_port_comes_back_under_its_link(start_emulator: Callable[..., Any], tmp_path: Path) -> None:
     link, control = tmp_path / "table", tmp_path / "control"
-    running = stand_in("--pty", "--link", str(link), "--control", str(control))
+    running = start_emulator("--pty", "--link", str(link), "--control", str(control))
     with TableClient.open(str(link)) as client:
         assert client.position_deg() == 0.0
         command(control, "fault-hang-up", "--for-s", "0.3")
         with pytest.raises(TableError):
             read_often(client)
-    running.wait_for_words("has come back")
+    running.wait_for_words("is available again")
     with TableClient.open(str(link)) as client:
         assert client.position_deg() == 0.0
 
 
 @pytest.mark.realtime
 def test_over_tcp_a_pulled_port_turns_clients_away(
-    stand_in: Callable[..., Any], tmp_path: Path, wait_until: Callable[[Callable[[], bool]], None]
+    start_emulator: Callable[..., Any], tmp_path: Path, wait_until: Callable[[Callable[[], bool]], None]
 ) -> None:
     control = tmp_path / "control"
-    running = stand_in("--tcp", "0", "--control", str(control))
+    running = start_emulator("--tcp", "0", "--control", str(control))
     with TableClient.open(running.port) as client:
         assert client.position_deg() == 0.0
         command(control, "fault-hang-up")

@@ -1,4 +1,4 @@
-"""When a fault begins and ends, and that chance is seeded."""
+"""The start and the end of faults, and their random seed."""
 
 from pathlib import Path
 

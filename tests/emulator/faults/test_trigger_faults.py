@@ -1,4 +1,4 @@
-"""What a fault of the trigger does to the latch."""
+"""The effect of a trigger fault on the latch."""
 
 import pytest
 

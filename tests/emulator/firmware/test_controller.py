@@ -33,7 +33,7 @@ ONE = 1 << BITS
 PROFILE = Profile.of(round(20 * 0.512 * ONE), round(50 * 0.000512 * ONE))
 
 Shaft = Callable[[FirmwareState], int]
-"""Where the encoder stands after a tick, for a controller's state before it."""
+"""The position of the encoder after a tick, for a controller's state before it."""
 
 
 def blocked(state: FirmwareState) -> int:
@@ -117,7 +117,7 @@ def test_a_table_that_is_pushed_away_from_its_target_is_brought_back_first() -> 
 def test_a_table_that_creeps_too_long_is_switched_off() -> None:
     settling = begin_motion(woken(), PROFILE, 0, BITS)._replace(motion=SETTLING, reference=Reference(5000, 0, 0, 0, 0))
     ticks = FIRMWARE.settling_ticks
-    states = run(settling, lambda state: state.counts[-1] ^ 1, ticks)  # it never stands, it never comes nearer
+    states = run(settling, lambda state: state.counts[-1] ^ 1, ticks)  # it never stands, and never gets nearer
     assert motions(states) == [SETTLING, STALLED]
     assert [state.motion for state in states].index(STALLED) == ticks - 1
 
@@ -132,7 +132,7 @@ def test_a_motor_that_stands_while_driven_is_switched_off_and_the_state_says_so(
 
 
 def test_one_count_is_enough_to_show_that_it_turns() -> None:
-    """A count every 200 ms, less than the protection's time, is a motor that struggles, not one that stands."""
+    """A count every 200 ms, faster than the protection's time: the motor is slow, but does not stand."""
     ticks = iter(range(10_000))
     moving = begin_motion(woken(), PROFILE, 30 * 512 * ONE, BITS)
     states = run(moving, lambda _: next(ticks) // 200, 1000)
@@ -157,7 +157,7 @@ def test_a_pre_emption_keeps_reference_speed_and_regulator() -> None:
 
 @given(st.lists(st.integers(-30, 30), max_size=30), st.integers(-INT32_MAX, INT32_MAX))
 def test_the_speed_is_the_counts_difference_over_the_window(moves: list[int], start: int) -> None:
-    """Over the counter's end as well, and while the drive is off."""
+    """Also past the counter's limit, and while the drive is off."""
     state, count, history = woken(start), start, [0] * 8
     for move in moves:
         count = (count + move + 2**31) % 2**32 - 2**31

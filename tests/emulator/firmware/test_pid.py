@@ -1,4 +1,4 @@
-"""The fixed-point regulator against its law in real numbers."""
+"""The fixed-point PID compared with its law in real numbers."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -42,7 +42,7 @@ def test_the_law_is_that_of_real_numbers_within_its_quantization(gains: Gains, d
         integral += Fraction(gains.integral, 1 << 16) * error
         output = Fraction(gains.proportional, 1 << 12) * error + integral - Fraction(gains.derivative, 1 << 12) * change
         if max(abs(output), abs(integral)) > 1000:
-            return  # saturation has tests of its own
+            return  # other tests cover saturation
         assert abs(state.duty - output) <= Fraction(1, 2) + Fraction(tick, ONE_STEP)
 
 
@@ -67,7 +67,7 @@ def test_gains_are_the_configured_ones_in_the_firmwares_units(gains: GainsConfig
 def test_switching_the_gain_set_does_not_move_the_duty(
     ramp: Gains, hold: Gains, demand: int, measured: int, ticks: int
 ) -> None:
-    """But for one tick's integral, at a constant error; a duty at its limit may leave it."""
+    """Except for one tick's integral, at a constant error; a duty at its limit may differ."""
     parameters, state = regulator(ramp, hold), REST
     for _ in range(ticks + 1):
         state = step(parameters, state, HOLD, demand, measured)
@@ -75,14 +75,14 @@ def test_switching_the_gain_set_does_not_move_the_duty(
     assume(abs(state.duty) < 1023)
     assume(abs(switched.integral) < 1023 * ONE_STEP)
     growth = abs(Fraction(ramp.integral * (demand - measured * COUNT), ONE_STEP << 4))
-    # the derivative of the tick before may have acted for the last time
+    # the derivative of the previous tick may have acted for the last time
     kick = Fraction(hold.derivative * abs(measured), 1 << 12) if ticks == 0 else 0
     assert abs(switched.duty - state.duty) <= growth + kick + 1
 
 
 @given(gains=gains, excess=st.integers(1, 8000), ticks=st.integers(1, 3000))
 def test_a_saturated_duty_comes_down_as_soon_as_the_error_turns(gains: Gains, excess: int, ticks: int) -> None:
-    """Anti-windup: however long it was saturated, the integral alone is never beyond full duty."""
+    """Anti-windup: however long the saturation, the integral alone never exceeds full duty."""
     parameters, state = regulator(gains), REST
     for _ in range(min(ticks, 200)):
         state = step(parameters, state, HOLD, excess * COUNT, 0)

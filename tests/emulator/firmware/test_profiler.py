@@ -19,7 +19,7 @@ TICK_S = 0.001
 DEG = ONE * 512  # one degree, with 26 fraction bits, on the default table
 DEG_S = DEG * TICK_S
 DEG_S2 = DEG_S * TICK_S
-SPEED_LIMIT = round(60.5 * DEG_S)  # the most that the registers hold
+SPEED_LIMIT = round(60.5 * DEG_S)  # the maximum of the registers
 STANDING = Reference(0, 0, 0, 0, 0)
 
 speeds = st.integers(1, SPEED_LIMIT)
@@ -36,7 +36,7 @@ def distance_left(reference: Reference) -> int:
 
 
 def run_to_rest(profile: Profile, reference: Reference, ticks: int) -> Iterator[Reference]:
-    """Yield the reference, and again after each tick until it stands; fail if it does not within `ticks`."""
+    """Yield the reference now and after each tick until it stands; fail if it does not within `ticks`."""
     yield reference
     for _ in range(ticks):
         if at_rest(reference):
@@ -59,7 +59,7 @@ def ruckig_trajectory(speed_deg_s: float, profile: Profile, distance_deg: float)
 
 
 def random_motion(chance: random.Random) -> tuple[Profile, int]:
-    """Return S and A over their range, and a target ahead or behind, near or far, or here."""
+    """Return S and A over their range, and a target ahead or behind, near or far, or at the present position."""
     speed_deg_s = 10 ** chance.uniform(-1.0, 1.6)
     acceleration_deg_s2 = 10 ** chance.uniform(-0.3, 2.0)
     distance_deg = chance.choice([0.0, chance.uniform(-1.0, 1.0) * 10 ** chance.uniform(-2.0, 1.5)])
@@ -69,10 +69,10 @@ def random_motion(chance: random.Random) -> tuple[Profile, int]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_pre_empted_motions_are_those_that_ruckig_plans(seed: int) -> None:
-    """500 motions a seed, each interrupting the one before at a random instant.
+    """500 motions per seed; each interrupts the previous one at a random instant.
 
-    Ruckig changes its acceleration at any instant, the profiler only between ticks: a change that falls within a tick
-    is a tick's average, so speeds differ by less than the acceleration times half a tick, and positions by less than
+    Ruckig changes its acceleration at any instant, the profiler only between ticks. A change within a tick becomes the
+    average of the tick. So speeds differ by less than the acceleration times half a tick, and positions by less than
     the acceleration times half a tick squared. Such differences do not add up: the profiler looks ahead at each tick.
     """
     chance = random.Random(seed)  # noqa: S311  # a test's draw
@@ -140,7 +140,9 @@ def test_the_smallest_registers_still_arrive(speed: int, acceleration: int, dist
 def test_no_overshoot_where_there_is_room_to_brake(speed: int, acceleration: int, spare: int, share: float) -> None:
     profile = Profile.of(speed, acceleration)
     start_speed = int(min(speed, 500 * acceleration) * share)
-    braking = -(-start_speed * (start_speed + acceleration) // (2 * acceleration))  # the mean tick's way included
+    braking = -(
+        -start_speed * (start_speed + acceleration) // (2 * acceleration)
+    )  # including the mean travel of a tick
     reference = retarget(Reference(0, 0, start_speed, 0, 0), braking + spare, BITS)
     for _ in range(1500):
         reference = step(profile, reference, BITS)
@@ -150,7 +152,7 @@ def test_no_overshoot_where_there_is_room_to_brake(speed: int, acceleration: int
 
 @pytest.mark.parametrize("target", [0, 1, -1, 10 * DEG, 40 * DEG])
 def test_a_target_too_near_is_passed_by_the_braking_distance_alone(target: int) -> None:
-    """At 40 deg/s and 100 deg/s2 the table needs 8 degrees; a target within them is come back to."""
+    """At 40 deg/s and 100 deg/s2 the table needs 8 degrees; it returns to a target within them."""
     profile = Profile.of(round(40 * DEG_S), round(100 * DEG_S2))
     start = Reference(0, 0, profile.speed, 0, 0)
     farthest = max(position(reference) for reference in run_to_rest(profile, retarget(start, target, BITS), 5000))
@@ -179,7 +181,7 @@ def test_the_counter_wraps_and_the_motion_goes_on() -> None:
 
 
 class Register(int):
-    """An integer of a 64-bit machine: an operation whose result does not fit it fails."""
+    """An integer of a 64-bit machine: an operation whose result does not fit fails."""
 
     def __new__(cls, number: int) -> Self:
         assert -(1 << 63) <= number < 1 << 63, f"{number} does not fit 64 bits"
@@ -226,7 +228,7 @@ extremes = st.sampled_from([1, 2, 7, ONE >> 10, ONE >> 5, ONE - 1, ONE])
 def test_no_intermediate_result_exceeds_64_bits(
     speed: int, acceleration: int, start_speed: int, distance: int, near_braking: bool
 ) -> None:
-    """The same source, run on numbers that check themselves, up to the ends of every range."""
+    """The same source, run with checked integers, up to the ends of every range."""
     if near_braking:
         distance = start_speed * start_speed // (2 * acceleration)
     profile = Profile(*map(Register, Profile.of(speed, acceleration)))

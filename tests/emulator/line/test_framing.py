@@ -34,7 +34,7 @@ def test_half_rate_reads_each_pair_of_bits_as_one() -> None:
 
 
 def test_double_rate_reads_each_bit_twice() -> None:
-    # Bits of 0xFF: one low, then high for ever. At twice the rate: start low, first data bit low, the rest high.
+    # Bits of 0xFF: one low, then always high. At twice the rate: start low, first data bit low, the rest high.
     assert read_at_rate(b"\xff", sender_baud=4800, receiver_baud=9600) == b"\xfe"
     # 0x00 holds the line low for 18 of the receiver's bits: one byte of zeros, and no second edge within it.
     assert read_at_rate(b"\x00", sender_baud=4800, receiver_baud=9600) == b"\x00"

@@ -1,4 +1,4 @@
-"""The paced line: exact in integers, and as forgetful as a small controller's."""
+"""The paced line: exact in integers, with the losses of a small controller."""
 
 from fractions import Fraction
 from math import ceil

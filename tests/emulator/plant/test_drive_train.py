@@ -45,10 +45,10 @@ def random_table(chance: random.Random, tick_hz: int) -> TableConfig:
 @pytest.mark.parametrize("tick_hz", [1000, 20_000])
 @pytest.mark.parametrize("seed", range(10))
 def test_the_plant_is_its_hybrid_model_within_a_tick_an_event(seed: int, tick_hz: int) -> None:
-    """Each leg holds a random voltage and load for some time.
+    """Each leg has a random voltage and load for some time.
 
-    The plant takes a whole tick in one mode, so that an event comes up to a tick late; until then its sides go on at
-    their speed and acceleration. Ticks that are twenty times finer come twenty times nearer.
+    The plant computes a whole tick in one mode, so an event is up to a tick late. Until then its sides continue with
+    their speed and acceleration. With ticks that are twenty times finer, the deviation is twenty times smaller.
     """
     chance = random.Random(seed)  # noqa: S311  # a test's draw
     config = random_table(chance, tick_hz) if seed else configured(tick_hz=tick_hz)
@@ -102,7 +102,7 @@ def test_a_shorted_motor_never_gains_energy(
 
 
 def breakaway_V(config: TableConfig, direction: int, load_torque_Nm: float) -> float:
-    """Return the voltage at which a table begins to turn that stood with its teeth on the driving flank."""
+    """Return the voltage at which a table at rest with its teeth on the driving flank starts to turn."""
     motor, gears, friction = config.motor, config.gears, config.friction
     table_Nm = config.table.bearing_friction_Nm + direction * load_torque_Nm
     torque_Nm = friction.coulomb_Nm * friction.stiction_ratio + table_Nm / (gears.ratio * gears.efficiency)
@@ -128,7 +128,7 @@ def test_stiction_holds_below_the_static_torque_and_breaks_above(
 @pytest.mark.parametrize("backlash_arcmin", [0.0, 10.0])
 @pytest.mark.parametrize("direction", [1, -1])
 def test_a_load_turns_a_motor_that_is_off_only_through_the_gears_losses(backlash_arcmin: float, direction: int) -> None:
-    """Backwards through the gears the load has the efficiency against it: 1.39 Nm, not 0.56, on the default table."""
+    """In the backward direction the efficiency acts against the load: 1.39 Nm, not 0.56, on the default table."""
     config = configured(backlash_arcmin=backlash_arcmin)
     train, gears, friction = drive_constants(config), config.gears, config.friction
     static_Nm = friction.coulomb_Nm * friction.stiction_ratio
@@ -145,7 +145,7 @@ def test_a_load_turns_a_motor_that_is_off_only_through_the_gears_losses(backlash
 def test_the_motor_pays_or_is_paid_for_a_load_less_the_gears_losses(
     backlash_arcmin: float, load_torque_Nm: float, weight: float
 ) -> None:
-    """At a steady speed the torques balance: a load against the motion weighs more, one that drives the motor less."""
+    """At a steady speed the torques balance: a load against the motion counts more, a driving load counts less."""
     config = configured(backlash_arcmin=backlash_arcmin)
     train = drive_constants(config)
     state = held(
@@ -174,7 +174,7 @@ def test_without_backlash_motor_and_table_turn_as_one() -> None:
 
 @pytest.mark.parametrize("efficiency", [0.3, 0.6])
 def test_a_rigid_chain_brakes_its_table_through_the_gears_losses(efficiency: float) -> None:
-    """The limit of a small gap: on the way down the table drives the motor, and its inertia weighs less there."""
+    """The limit of a small gap: during deceleration the table drives the motor, and its inertia counts less."""
     rigid = drive_constants(configured(backlash_arcmin=0.0, efficiency=efficiency))
     narrow = drive_constants(configured(backlash_arcmin=1e-6, efficiency=efficiency))
     stopped = [held(train, on_flank(train, -1, 400.0), 0.0, 0.0, 300) for train in (rigid, narrow)]

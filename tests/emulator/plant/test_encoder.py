@@ -23,7 +23,7 @@ def test_the_default_table_gives_512_counts_a_degree() -> None:
 
 @given(turns=st.integers(-1000, 1000), share=st.floats(0.01, 0.99), phase=st.floats(0.0, 1.0))
 def test_the_count_changes_where_an_edge_is_passed(turns: int, share: float, phase: float) -> None:
-    """Each count is one interval of the shaft, also below zero: a floor, not a truncation."""
+    """Each count is one interval of the shaft, also below zero: rounded down, not toward zero."""
     angle = (384 * turns + share - phase) / COUNT_RAD
     assert count_at(Encoder(COUNT_RAD, phase), angle) == 384 * turns
 
@@ -51,14 +51,14 @@ def test_a_counter_that_is_set_keeps_the_edges_where_they_are(
 
 
 def smooth(before: DriveState, after: DriveState) -> bool:
-    """Tell whether a tick went without an impact, a separation or a stop."""
+    """Return whether a tick went without an impact, a separation or a stop."""
     return before.contact == after.contact and before.speed_rad_s * after.speed_rad_s > 0.0
 
 
 @pytest.mark.parametrize("contact", [0, 1])
 @pytest.mark.parametrize("backlash_arcmin", [10.0, 600.0])
 def test_within_a_tick_the_angle_is_known_to_a_count_at_any_speed(contact: int, backlash_arcmin: float) -> None:
-    """Full voltage, reversed at full speed, with the table and without it, against steps a hundredth as long."""
+    """Full voltage, reversed at full speed, with and without the table, compared with steps a hundredth as long."""
     config = replace(DEFAULT, gears=replace(DEFAULT.gears, backlash_arcmin=backlash_arcmin))
     train = drive_constants(config)
     fine = drive_constants(replace(config, control=replace(config.control, tick_hz=FINE * config.control.tick_hz)))

@@ -31,7 +31,7 @@ def test_a_link_that_was_left_behind_is_replaced(tmp_path: Path) -> None:
 def test_an_ordinary_file_is_never_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "thesis.tex"
     path.write_text("three years of work")
-    with pytest.raises(FileExistsError, match="something else"):
+    with pytest.raises(FileExistsError, match="is not a link to a pty"):
         DeviceLink(path, DEVICE)
     assert path.read_text() == "three years of work"
 
@@ -50,7 +50,7 @@ def test_a_directory_is_never_overwritten(tmp_path: Path) -> None:
         DeviceLink(tmp_path, DEVICE)
 
 
-def test_a_link_that_another_stand_in_has_taken_over_is_left_to_it(tmp_path: Path) -> None:
+def test_a_link_that_another_emulator_has_taken_over_is_left_to_it(tmp_path: Path) -> None:
     path = tmp_path / "table"
     first = DeviceLink(path, DEVICE)
     DeviceLink(path, OTHER_DEVICE)
@@ -63,7 +63,7 @@ def test_a_link_whose_place_another_file_has_taken_leads_nowhere_new(tmp_path: P
     link = DeviceLink(path, DEVICE)
     path.unlink()
     path.write_text("three years of work")
-    with pytest.raises(FileExistsError, match="something else"):
+    with pytest.raises(FileExistsError, match="is not a link to a pty"):
         link.lead_to(OTHER_DEVICE)
     assert path.read_text() == "three years of work"
 
@@ -82,7 +82,7 @@ def test_the_link_of_a_living_emulator_is_left_to_it_and_that_of_a_dead_one_is_t
     with pytest.raises(FileExistsError, match="another emulator"):
         DeviceLink(path, DEVICE)
     assert path.readlink() == Path(name)
-    DeviceLink(path, name)  # its own, that one left behind which had the same device before
+    DeviceLink(path, name)  # its own link; the old one with the same device remained
     os.close(device)
     os.close(server)
     second = DeviceLink(path, DEVICE)

@@ -18,7 +18,7 @@ from emulator.ports.pty_port import READ_BYTES, PtyPort
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what is known about ptys was measured on Linux")
 
 PTY_BYTES = 40_000
-"""More than a pty holds one way."""
+"""More than the buffer of a pty in one direction."""
 
 TIOCGEXCL = 0x80045440
 """Linux's question whether a terminal is locked; Python has no name for it."""
@@ -117,12 +117,12 @@ def test_two_clients_in_one_look_are_warned_of_only_where_a_line_is_refused(
     os.close(client)
     os.write(opened(port.name), second)
     assert port.receive().is_doubtful
-    assert len([sentence for sentence in warnings if "one right after the other" in sentence]) == count
+    assert len([sentence for sentence in warnings if "in immediate succession" in sentence]) == count
 
 
 def test_bytes_that_came_after_the_last_look_may_be_of_a_client_that_left_then(port: PtyPort, opened: Open) -> None:
     client = opened(port.name)
-    os.write(client, b"H\r" * READ_BYTES + b"R 9")  # more than a look takes
+    os.write(client, b"H\r" * READ_BYTES + b"R 9")  # more than one read takes
     port.receive()
     os.close(client)
     os.write(opened(port.name), b"0\r")
@@ -171,7 +171,7 @@ def test_an_echo_that_a_client_switches_on_is_switched_off_again(
 
 
 class Slow(PtyPort):
-    """A port where a client leaves, and another comes and writes, between the look at clients and that at bytes."""
+    """A port at which a client disconnects, and another connects and writes, between two reads of the port."""
 
     deeds: ClassVar[list[Callable[[], object]]] = []
 
@@ -191,7 +191,7 @@ def test_a_client_that_leaves_while_bytes_are_read_is_not_glued_to_the_next(warn
 
 
 class Overtaken(PtyPort):
-    """A port whose next client writes just when the bytes of the last one are looked at."""
+    """A port whose next client writes exactly when the bytes of the last one are read."""
 
     next_client = -1
 
@@ -205,7 +205,7 @@ class Overtaken(PtyPort):
 def test_of_doubtful_bytes_every_line_is_refused_that_does_more_than_read() -> None:
     assert spoiled(b"R 90\rR 1\r") == b"\x18R 90\r\x18R 1\r"
     assert spoiled(b"S 20\r\rR 9") == b"\x18S 20\r\r\x18R 9"
-    assert spoiled(b"\x18\rH\rL\r") == b"\x18\x18\rH\rL\r"  # how a client begins that finds its place
+    assert spoiled(b"\x18\rH\rL\r") == b"\x18\x18\rH\rL\r"  # the first bytes of a client that resynchronizes
 
 
 def test_a_client_that_writes_while_another_leaves_is_not_taken_for_it(warnings: list[str], opened: Open) -> None:
@@ -347,7 +347,7 @@ def test_two_programs_at_once_are_warned_of(port: PtyPort, opened: Open, warning
 
 
 def test_parity_and_seven_bits_do_not_exist_on_a_pty(port: PtyPort) -> None:
-    """The system drops them: what goes over the line is 8N1 all the same, for one client after the other."""
+    """The system drops them: the line stays 8N1 for one client after the other."""
     for _ in range(2):
         with serial.Serial(port.name, 9600, bytesize=serial.SEVENBITS, parity=serial.PARITY_EVEN) as client:
             client.write(b"\xc8\r")

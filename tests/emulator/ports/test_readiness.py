@@ -1,4 +1,4 @@
-"""Waiting for descriptors, those beyond the numbers of `select` among them."""
+"""Waiting for descriptors, including those with numbers too large for `select`."""
 
 import fcntl
 import os
@@ -17,7 +17,7 @@ BEYOND_SELECT = 1500
 
 @pytest.fixture(params=[0, BEYOND_SELECT], ids=["few descriptors", "many descriptors"])
 def pipe(request: pytest.FixtureRequest) -> Iterator[tuple[int, int]]:
-    """A pipe, whose ends have numbers of at least so much."""
+    """A pipe whose ends have at least the given numbers."""
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
     if before[1] != resource.RLIM_INFINITY and before[1] < request.param + 10:
         pytest.skip("this system gives no so many descriptors")

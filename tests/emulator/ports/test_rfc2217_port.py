@@ -1,4 +1,4 @@
-"""The port that speaks telnet: settings travel, bytes come through whole, and no client brings it down."""
+"""The telnet port: it transmits settings and all bytes, and no client can make it fail."""
 
 import random
 import socket
@@ -23,7 +23,7 @@ ANY_BYTES = bytes(range(256))
 
 
 class Served:
-    """A port that is looked at until the test is over, as the server does."""
+    """A port that is polled until the end of the test, as by the server."""
 
     def __init__(self, port: Rfc2217Port) -> None:
         self.port = port

@@ -42,7 +42,7 @@ def test_facts_shows_what_clients_may_rely_on(stand: QuietStand) -> None:
         (b"[]", "object"),
         (b"{}", "names its command"),
         (b'{"command": 1}', "names its command"),
-        (b'{"command": "dance"}', "'dance' is not a command; there are trigger"),
+        (b'{"command": "dance"}', "'dance' is not a command; allowed are trigger"),
         (b'{"command": "trigger", "now": 1}', "takes no parameter"),
         (b'{"command": "load-torque"}', "takes torque_Nm"),
         (b'{"command": "load-torque", "torque_Nm": "1"}', "must be a number"),
@@ -76,7 +76,7 @@ VALUES = st.recursive(SCALARS, lambda inner: st.lists(inner) | st.dictionaries(s
 
 @st.composite
 def requests(draw: st.DrawFn) -> bytes:
-    """Draw a request whose name and parameters are mostly known, with any value in each place."""
+    """Draw a request with mostly known name and parameters, and any values."""
     name = draw(st.sampled_from(sorted(COMMANDS)) | st.text())
     known = [parameter.name for parameter in COMMANDS[name].parameters] if name in COMMANDS else NAMES
     fields: dict[str, Any] = {"command": name}

@@ -1,4 +1,4 @@
-"""The control channel's socket, and clients that come in pieces, in crowds and not at all."""
+"""The socket of the control channel, and clients that send in pieces, in large numbers or not at all."""
 
 import json
 import os
@@ -32,7 +32,7 @@ def test_the_mask_of_new_files_is_left_as_it_was(folder: Path) -> None:
     assert os.umask(before) == 0o022
 
 
-def test_a_socket_that_a_dead_stand_in_left_is_replaced(folder: Path) -> None:
+def test_a_socket_that_a_dead_emulator_left_is_replaced(folder: Path) -> None:
     path = folder / "control"
     with socket.socket(socket.AF_UNIX) as dead:
         dead.bind(str(path))

@@ -1,4 +1,4 @@
-"""The loop that serves the table, with a wall clock and clients that do as they are told."""
+"""The server loop of the table, with a simulated wall clock and scripted clients."""
 
 import os
 import socket
@@ -32,7 +32,7 @@ class Wall:
 
 
 class ToldPort:
-    """A port whose clients do one thing after another, each when the server looks."""
+    """A port whose clients make one action after another, each when the server reads."""
 
     name = "told"
     client_count = 1
@@ -40,7 +40,7 @@ class ToldPort:
 
     def __init__(self) -> None:
         self._reader, self._writer = os.pipe()
-        os.write(self._writer, b"!")  # there is always something to look at
+        os.write(self._writer, b"!")  # there is always something to read
         self.input_descriptors: tuple[int, ...] = (self._reader,)
         self.arrivals: list[Callable[[], Arrival]] = []
         self.sent = b""
@@ -110,7 +110,7 @@ def test_a_client_that_comes_after_a_reset_is_not_taken_for_the_one_that_left(
         return Arrival(data=b"P 9", left_after=True)
 
     def ask() -> Arrival:
-        wall.now_s += 0.1  # for the bytes to be carried
+        wall.now_s += 0.1  # for the bytes to be transmitted
         return Arrival(data=b"H\r")
 
     def end() -> Arrival:
@@ -139,7 +139,7 @@ def test_a_client_that_comes_after_a_reset_is_not_taken_for_the_one_that_left(
 def test_a_stop_of_more_than_half_a_second_is_left_out_at_rest_and_in_motion_alike(
     table: Table, wall: Wall, port: ToldPort, *, moving: bool, time_scale: float, pause_s: float, missing_s: float
 ) -> None:
-    """The clock of a process that was stopped (SIGSTOP) goes on; the table makes up for all or for nothing."""
+    """The clock of a stopped process (SIGSTOP) continues; the table catches up completely or not at all."""
     said: list[str] = []
     clock = Clock(1000, time_scale, wall_s=wall)
     if moving:

@@ -1,4 +1,4 @@
-"""The compiled tick against the interpreted one: the same source, so the same states to the last bit."""
+"""The compiled tick compared with the interpreted one: the same source, so bit-identical states."""
 
 import random
 
@@ -37,7 +37,7 @@ def random_loads(chance: random.Random) -> Loads:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_interpreted_and_compiled_agree_to_the_last_bit(seed: int) -> None:
-    """Random motions and loads, strong ones among them that stall the table."""
+    """Random motions and loads, including strong ones that stall the table."""
     chance = random.Random(seed)  # noqa: S311  # a test's draw
     snapshot = Table(CONFIG, seed).snapshot()
     motions, loads = random_motions(chance), random_loads(chance)
@@ -50,8 +50,8 @@ def test_interpreted_and_compiled_agree_to_the_last_bit(seed: int) -> None:
     assert compiled_samples.tobytes() == samples.tobytes()
 
 
-def test_a_batch_is_what_the_stand_in_does() -> None:
-    """The same motion by command and by row; samples bear what the status says."""
+def test_a_batch_is_what_the_emulator_does() -> None:
+    """The same motion by command and by row; samples contain the values of the status."""
     table = Table(CONFIG, seed=3)
     snapshot = table.snapshot()
     table.receive(b"S 20\rA 50\rR -30\r")

@@ -1,4 +1,4 @@
-"""What a fault of drive or encoder does to the motion, and what the firmware does about it."""
+"""The effect of a fault of drive or encoder on the motion, and the reaction of the firmware."""
 
 import pytest
 from hypothesis import given, settings

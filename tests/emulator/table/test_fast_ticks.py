@@ -1,4 +1,4 @@
-"""Stretches that pass at once, compiled or not, end in the states of a table that is watched tick by tick."""
+"""Ticks that pass at once, compiled or not, end in the states of a table that is observed tick by tick."""
 
 import sys
 
@@ -56,8 +56,8 @@ DEEDS = st.one_of(
 )
 
 
-def do(table: Table, deed: str, what: object) -> object:  # noqa: C901  # a case for each deed
-    """Do one thing to a table, and return what can be seen of it."""
+def do(table: Table, deed: str, what: object) -> object:  # noqa: C901  # a case for each action
+    """Apply one action to a table, and return its observable state."""
     match deed, what:
         case "receive", bytes(data):
             table.receive(data)
@@ -183,14 +183,14 @@ def test_a_numba_that_cannot_keep_its_code_is_done_without(monkeypatch: pytest.M
 
 
 class Interrupting(FastTicks):
-    """A run into which Ctrl-C breaks once, when its ticks have passed."""
+    """A run that Ctrl-C interrupts once, after its ticks."""
 
     is_armed = True
 
     def __call__(
         self, constants: TableConstants, state: TableState, load_torque_Nm: float, ticks: int
     ) -> tuple[TableState, bool]:
-        """Pass the ticks, and break off at the first call."""
+        """Run the ticks, and interrupt the first call."""
         passed = super().__call__(constants, state, load_torque_Nm, ticks)
         if self.is_armed:
             self.is_armed = False

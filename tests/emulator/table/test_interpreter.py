@@ -1,4 +1,4 @@
-"""What each verb does to the controller and its registers, without plant or line."""
+"""The effect of each verb on the controller and its registers, without plant or line."""
 
 from dataclasses import replace
 from decimal import Decimal
@@ -70,7 +70,7 @@ def test_an_angle_just_below_half_a_digit_is_not_rounded_twice() -> None:
         CONFIG, encoder=replace(CONFIG.encoder, lines=97), gears=replace(CONFIG.gears, ratio=1009.0)
     ).with_serial(decimals=6)
     turn = int(config.counts_per_turn)
-    for nearest in range(-9, 10, 2):  # how far the angle of the count is beside the middle between two digits
+    for nearest in range(-9, 10, 2):  # distance of the angle of the count from the middle between two digits
         count = (turn // 4 + nearest) // 2 * pow(90_000_000, -1, turn // 4) % (turn // 4)
         angle = Interpreter(config).angle_deg(count)
         digits = Fraction(count * 360, turn) * 10**6

@@ -1,4 +1,4 @@
-"""Tables of other encoders, gears and ticks: each state fits its registers, and each motion ends on its target."""
+"""Tables with other encoders, gears and ticks: each state fits its registers, and each motion ends at its target."""
 
 import random
 from dataclasses import replace
@@ -41,7 +41,7 @@ NAMED = {
 
 @pytest.fixture(params=NAMED)
 def config(request: pytest.FixtureRequest, tmp_path: Path) -> TableConfig:
-    """A table that only the wider formats let in; its gains are no concern of these tests."""
+    """A table that only the wider formats allow; its gains do not matter in these tests."""
     path = tmp_path / "table.toml"
     path.write_text(NAMED[request.param], encoding="utf-8")
     return load_config(path).with_serial(baud=0)
@@ -72,7 +72,7 @@ def test_the_default_table_has_26_fraction_bits() -> None:
 
 
 def test_a_motion_at_the_limits_ends_on_its_target_and_fits_the_registers(config: TableConfig) -> None:
-    """A shaft that follows the reference: 3.7 deg there, and 1.2 deg back."""
+    """A shaft that follows the reference: 3.7 deg forward, and 1.2 deg back."""
     parameters, bits = firmware_constants(config), config.motion_bits
     tick_hz, limits = config.control.tick_hz, config.limits
     for angle_deg in (3.7, -1.2):
@@ -146,7 +146,10 @@ def test_the_greatest_speed_and_acceleration_fit_and_no_bit_is_given_away(
 
 @pytest.mark.parametrize(("lines", "ratio"), [(96, 2197 / 27), (96, 498.9), (500, 480.0), (1024, 1e6 / 7919)])
 def test_a_million_turns_do_not_drift(lines: int, ratio: float) -> None:
-    """The sum of a million whole turns, each rounded to the register, and the reading of counts, against fractions."""
+    """The sum of a million whole turns, each rounded to the register, compared with fractions.
+
+    The reading of counts is compared too.
+    """
     config = replace(DEFAULT, encoder=replace(DEFAULT.encoder, lines=lines), gears=replace(DEFAULT.gears, ratio=ratio))
     interpreter, turn = Interpreter(config), 4 * lines * Fraction(ratio).limit_denominator(10_000)
     registers = interpreter.power_on()
@@ -171,7 +174,7 @@ def test_a_table_does_not_creep_faster_than_its_limit() -> None:
 
 @pytest.mark.parametrize("gain_set", [RAMP, HOLD])
 def test_no_product_of_the_regulator_leaves_64_bits(gain_set: int) -> None:
-    """Compiled, 64 bits wrap without a word; interpreted, integers are as long as need be: both must agree."""
+    """Compiled, 64 bits wrap without an error; interpreted, integers have any length: both must agree."""
     widest = Gains(INT32_MAX, INT32_MAX, INT32_MAX)
     regulator = Pid(widest, Gains(1, INT32_MAX, INT32_MAX), duty_max=2047)
     step_64 = compiled(regulator_step)

@@ -1,4 +1,4 @@
-"""The controller's end of the line, with a firmware that says every line back."""
+"""The controller's end of the line, with a firmware that returns every line."""
 
 import pytest
 
@@ -12,7 +12,7 @@ TICK_HZ = 1000
 
 
 class Echo:
-    """A serial end, the faults of its line, and a firmware that remembers what it was asked."""
+    """A serial end, the faults of its line, and a firmware that stores the received lines."""
 
     def __init__(self, baud: int) -> None:
         self.faults = FaultSchedule((), TICK_HZ, seed=0)
@@ -29,7 +29,7 @@ class Echo:
         self.answer(self.end.receive(data))
 
     def advance(self, ticks: int) -> bytes:
-        """Let ticks pass and return what has left in them."""
+        """Advance some ticks and return the bytes sent in them."""
         for _ in range(ticks):
             self.tick += 1
             self.end.release(self.tick)

@@ -1,4 +1,4 @@
-"""What reaches the table past the wire: the probe's trigger, and what a laboratory does to it."""
+"""Inputs of the table besides the wire: the probe's trigger, and the actions of the bench."""
 
 import math
 from dataclasses import replace
@@ -30,7 +30,7 @@ class TestTheLatch:
 
     @pytest.mark.parametrize("fraction", [0.0, 0.25, 0.999])
     def test_it_is_exact_to_one_count_at_any_speed(self, fraction: float) -> None:
-        """Against the straight line between the angles at both ends of the tick, over a motion to 40 deg/s and back."""
+        """Compared with the straight line between the angles at the ends of the tick, in a motion to 40 deg/s."""
         table = Table(UNPACED)
         ask(table, "S 40", "A 100", "R 10")
         for _ in range(120):
@@ -44,7 +44,7 @@ class TestTheLatch:
             assert abs(after.registers.latched_count - expected) <= (1 if fraction else 0)
 
     def test_a_periodic_trigger_latches_at_its_rate(self) -> None:
-        """Every 2.5 ms: the latch moves in the ticks that bear an edge, to where the table was at it."""
+        """Every 2.5 ms: the latch changes in the ticks with an edge, to the position of the table at the edge."""
         table = Table(UNPACED)
         ask(table, "S 40", "A 100", "R 100")
         table.advance(1000)

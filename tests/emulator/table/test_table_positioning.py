@@ -1,4 +1,4 @@
-"""Where a table comes to rest, and how it gets there through one command after another."""
+"""The rest position of a table, and its motion through one command after another."""
 
 import math
 import random
@@ -67,7 +67,7 @@ class TestPositioning:
 class TestPreEmption:
     @pytest.mark.parametrize("seed", range(5))
     def test_the_references_speed_is_continuous(self, seed: int) -> None:
-        """Fig. 4: whatever comes and whenever, the speed changes by at most A a tick, from where it was."""
+        """Fig. 4: for any commands at any time, the speed changes by at most A per tick, from its present value."""
         chance, table = random.Random(seed), Table(UNPACED, seed)  # noqa: S311  # a test's draw
         before = table.status()
         for _ in range(12):
@@ -161,7 +161,7 @@ class TestTheEndsOfTheCounter:
 
     @pytest.mark.parametrize("direction", [1, -1])
     def test_a_motion_of_half_the_range_ends_where_it_should(self, direction: int) -> None:
-        """The last part of it, from a counter that is preset; the target is the first position either way."""
+        """The last part of the motion, from a preset counter; the target is the first position in both cases."""
         table = Table(UNPACED)
         table.reset(-(2**31) + 512 * 5)
         assert move(table, "S 40", "A 100", "P -4194304").encoder_deg == pytest.approx(-4194304, abs=REST_DEG)

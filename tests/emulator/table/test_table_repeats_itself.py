@@ -1,4 +1,4 @@
-"""The same configuration, seed, bytes and ticks give the same table, however time is cut."""
+"""The same configuration, seed, bytes and ticks give the same table, however the time is divided."""
 
 import random
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ class TestDeterminism:
     END = 2500
 
     def play(self, table: Table, steps: Iterator[int]) -> tuple[bytes, str]:
-        """Send the script at its ticks, with time cut into steps; return the replies and the last state."""
+        """Send the script at its ticks, with the time divided into steps; return the replies and the last state."""
         replies, events = b"", [*self.SCRIPT, (self.END, b"")]
         for (tick, data), (next_tick, _) in pairwise(events):
             assert table.tick == tick
@@ -64,7 +64,7 @@ class TestDeterminism:
         assert futures[0] == futures[1]
 
     def test_rest_is_skipped_without_a_trace(self) -> None:
-        """A day at rest, and a table that was watched tick by tick, end in the same state."""
+        """A day at rest, and a table that is observed tick by tick, end in the same state."""
         skipping, watched = Table(UNPACED, seed=1), Table(UNPACED, seed=1)
         watched.observer = lambda _status, _heard, _said: None
         for table in (skipping, watched):

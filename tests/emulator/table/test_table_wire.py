@@ -1,4 +1,4 @@
-"""The table as its client knows it: each line and its reply."""
+"""The table seen by its client: each line and its reply."""
 
 import math
 from fractions import Fraction
@@ -117,7 +117,10 @@ class TestTheWire:
     def test_a_client_that_outruns_the_line_never_moves_the_table_by_a_damaged_line(
         self, lines: list[int], pause: int
     ) -> None:
-        """Each S sets a speed that no other line can be cut to: what is set was sent, and every reply is whole."""
+        """Each S sets a speed that is not a part of another line.
+
+        So every set value was sent, and every reply is whole.
+        """
         table, sent, seen, replies = Table(PACED), set(), set(), b""
         for number in lines:
             text = f"{number / 100:.2f}"

@@ -15,7 +15,7 @@ def table_at_rest() -> tuple[TableConstants, TableState]:
 
 
 def table_in_motion() -> tuple[TableConstants, TableState]:
-    """Return a table that is told to turn by 100 counts, at 10 deg/s and 20 deg/s2."""
+    """Return a table that is commanded to turn by 100 counts, at 10 deg/s and 20 deg/s2."""
     constants, state = table_at_rest()
     profile = Profile.of(round(5.12 * COUNT), round(0.01024 * COUNT))
     bits = constants.firmware.motion_bits
@@ -37,7 +37,7 @@ def test_undisturbed_ticks_are_steps_one_after_the_other(ticks: int) -> None:
 
 
 def test_a_table_that_rests_is_told_from_one_that_will_move_on() -> None:
-    """A year of rest is over at once; a table at its target is not at rest while its motor still runs down."""
+    """A year of rest takes no time; a table at its target is not at rest while its motor still decelerates."""
     constants, state = table_in_motion()
     at_rest, rests = run_undisturbed(constants, state, 0.0, 365 * 86_400_000)
     assert rests

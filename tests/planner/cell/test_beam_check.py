@@ -1,4 +1,4 @@
-"""A path whose beam does not meet the part is named, with where."""
+"""A path whose beam does not meet the part is reported, with the locations."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ FAR = placement(0.0, 0.0, 400.0, 0.0, 180.0, 0.0)
     ("poses", "warning"),
     [
         ([GOOD, GOOD], None),
-        ([AWAY, AWAY], "the beam looks away from the part at all 2 locations; the beam is the +Z axis of a pose"),
+        ([AWAY, AWAY], "the beam points away from the part at all 2 locations; the beam is the +Z axis of a pose"),
         ([GOOD, MISS], "the beam misses the part at 1 of 2 locations (the first is 1)"),
         ([MISS, MISS], "the beam misses the part at all 2 locations"),
         (
@@ -47,7 +47,7 @@ def test_the_beams_of_the_shipped_scans_meet_their_parts(name: str) -> None:
     assert beam_warning(scan.path.T_WS, scan.mesh, scan.cell.probe) is None
 
 
-@pytest.mark.parametrize(("pitch_deg", "said"), [(180, []), (0, ["looks away from the part at all 2 locations"])])
+@pytest.mark.parametrize(("pitch_deg", "said"), [(180, []), (0, ["points away from the part at all 2 locations"])])
 def test_a_path_file_that_looks_away_is_named_when_the_scan_is_loaded(
     pitch_deg: int, said: list[str], tmp_path: Path
 ) -> None:

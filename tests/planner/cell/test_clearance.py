@@ -57,7 +57,7 @@ def coal_transform(pose: Poses) -> object:
 def coal_scene(
     joints: Poses, angle_deg: float, obstacles: tuple[Obstacle, ...]
 ) -> dict[str, list[tuple[object, object]]]:
-    """Return the shapes and where they are, by name."""
+    """Return the shapes and their positions, by name."""
     frames = CELL.arm.link_frames(joints[None])[0]
     scene: dict[str, list[tuple[object, object]]] = {}
     for part in BODIES.parts:

@@ -43,7 +43,7 @@ def test_the_surface_is_at_the_stand_off_or_behind_it_and_within_the_range_nearb
     hits_mm = RayCaster(mesh).first_hits(waypoints[:, :3, 3], waypoints[:, :3, 2]).distances_mm
     met = hits_mm[np.isfinite(hits_mm)]
     assert met.min() >= PROBE.stand_off_mm - 1.0
-    assert np.mean(met <= PROBE.farthest_mm) > 0.4  # beside the bracket's wall its base is far below
+    assert np.mean(met <= PROBE.farthest_mm) > 0.4  # beside the wall of the bracket, its base is far below
 
 
 def test_a_probe_stays_above_a_step_as_long_as_it_is_near() -> None:

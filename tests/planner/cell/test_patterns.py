@@ -1,4 +1,4 @@
-"""What every pattern promises, checked on the workpiece's mesh rather than on the pattern's own formulas."""
+"""The properties of every pattern, checked on the workpiece's mesh instead of the pattern's own formulas."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def test_the_beam_meets_the_surface_at_the_stand_off(kind: str, pattern: str) ->
     waypoints = waypoints_of(kind, pattern)
     beam_ends = waypoints[:, :3, 3] + PROBE.stand_off_mm * waypoints[:, :3, 2]
     _, distances, _ = closest_point(WORKPIECES[kind].mesh(), beam_ends)
-    assert distances.max() < 0.3  # how far the sphere's mesh is from the sphere
+    assert distances.max() < 0.3  # distance of the sphere's mesh from the sphere
 
 
 @pytest.mark.parametrize(("kind", "pattern"), [pair for pair in ALL if pair[0] not in ("block", "mould")])
@@ -104,7 +104,7 @@ def _unit(vectors: FloatArray) -> FloatArray:
 
 
 def _greatest_gap(covered: FloatArray, wanted: FloatArray) -> float:
-    """Return how far the farthest wanted point is from the nearest covered one."""
+    """Return the distance of the farthest required point from the nearest covered one."""
     return max(float(np.linalg.norm(covered - point, axis=1).min()) for point in wanted)
 
 

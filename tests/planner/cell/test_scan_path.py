@@ -41,7 +41,7 @@ def _shift(*x_mm: float) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
 @pytest.mark.parametrize(
     ("T_WS", "step_s", "message"),
     [
-        (POSES[:1], 0.5, r"1 location\(s\); it must have at least 2"),
+        (POSES[:1], 0.5, "the number of locations of the path is 1; it must be at least 2"),
         (POSES, 0.0, "time step is 0 s"),
         (POSES * np.nan, 0.5, "location 1 of the path holds a value that is not a finite number"),
         (POSES * [[[1.0]], [[1.5]]], 0.5, "location 2 of the path"),

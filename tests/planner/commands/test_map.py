@@ -72,7 +72,7 @@ def test_a_number_of_angles_that_cannot_be_meant_is_refused(
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("not a folder")
     assert main(["map", "cylinder", *SMALL, "--out", str(tmp_path / "file" / "out")]) == 2
-    assert "cannot be written" in capsys.readouterr().err
+    assert "cannot write" in capsys.readouterr().err
 
 
 SCAN_OF_A_MESH = """

@@ -1,4 +1,4 @@
-"""From a mesh that somebody brings to a verified plan: `new-scan`, `plan`, `run`."""
+"""From a new mesh to a verified plan: `new-scan`, `plan`, `run`."""
 
 import re
 from dataclasses import replace
@@ -16,7 +16,7 @@ from planner.defaults import AXES, PATTERN_NAMES
 from planner.geometry.mesh import load_mesh
 from planner.kinematics.arm import Arm
 from planner.map.config_map import ConfigurationMap
-from planner.planning.arm_motion import ArmMotion
+from planner.plans.arm_motion import ArmMotion
 from tests.planner.own_parts import OWN_PARTS
 
 MESHES = Path(__file__).parents[1] / "meshes"
@@ -24,7 +24,7 @@ FOREIGN = {"angle_block": ("--unit", "inch"), "plate_holes": ()}
 
 
 def new_scan(mesh: Path, *options: str) -> Path | None:
-    """Return the scan file that `new-scan` writes for a mesh, beside it."""
+    """Return the scan file that `new-scan` writes for a mesh, in the same folder."""
     scan = mesh.with_suffix(".toml")
     return scan if main(["new-scan", str(mesh), *options, "--out", str(scan)]) == 0 else None
 
@@ -38,7 +38,12 @@ def test_a_part_gets_a_scan_that_plans(name: str, tmp_path: Path, capsys: pytest
     shown = capsys.readouterr().out
     assert f"part.toml: {own.name}, " in shown
     unit = own.options[1] if "--unit" in own.options else "mm"
-    for assumed in (f"lengths in {unit} (--unit)", "axis points up (--up)", "workpiece_on_table =", "stand-off 150 mm"):
+    for assumed in (
+        f"lengths in {unit} (--unit)",
+        "of the file points up (--up)",
+        "workpiece_on_table =",
+        "stand-off 150 mm",
+    ):
         assert assumed in shown
     checked = re.search(r"checked: a plan exists in (\S+)", shown)
     assert checked is not None
@@ -124,7 +129,7 @@ def without_a_triangle() -> trimesh.Trimesh:
     ("mesh", "options", "message"),
     [
         (trimesh.creation.box((600.0, 80.0, 80.0)), (), r"reaches 302\.7 mm from the table's axis; it must stay"),
-        (trimesh.creation.box((1600.0, 80.0, 80.0)), (), r"longest side is 1600 mm; allowed is 10 to 1000 mm"),
+        (trimesh.creation.box((1600.0, 80.0, 80.0)), (), r"longest side is 1600 mm; allowed: 10 to 1000 mm"),
         (trimesh.creation.box((0.08, 0.08, 0.08)), (), r"is it in meters\? Then set unit"),
         (without_a_triangle(), (), r"the mesh is open at 3 edges"),
         (trimesh.creation.box((80.0, 80.0, 80.0)), ("--class", "mould"), r"no cavity in the middle of its top"),
@@ -162,5 +167,5 @@ def test_an_existing_file_is_not_overwritten(tmp_path: Path, capsys: pytest.Capt
     OWN_PARTS["cone"].mesh.export(tmp_path / "part.stl")
     (tmp_path / "part.toml").write_text("mine", encoding="utf-8")
     assert new_scan(tmp_path / "part.stl") is None
-    assert "part.toml: exists already; remove it, or write to another file with --out" in capsys.readouterr().err
+    assert "part.toml: already exists; remove it, or choose another file with --out" in capsys.readouterr().err
     assert (tmp_path / "part.toml").read_text(encoding="utf-8") == "mine"

@@ -6,8 +6,8 @@ import pytest
 
 import planner
 from planner.__main__ import main
-from planner.planning.plan_file import load_plan
 from planner.planning.planners import PLANNERS
+from planner.plans.plan_file import load_plan
 
 SMALL = ["--angles", "60", "--configuration", "LEFTY-ABOVE-NOFLIP"]
 

@@ -125,7 +125,7 @@ def test_a_plan_for_a_faster_table_is_refused(
     document["limits"]["speed_deg_s"] = 60.0
     plan_file.write_text(json.dumps(document))
     assert run(plan_file, tmp_path / "run") == 2
-    assert "plan within this table's own limits" in capsys.readouterr().err
+    assert "create a plan within the limits of the table" in capsys.readouterr().err
 
 
 def test_a_folder_without_a_run_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -145,7 +145,7 @@ def test_a_real_port_gets_the_same_commands_and_the_same_verdict(plan_file: Path
     assert status == 0
     assert run(plan_file, tmp_path / "virtual") == 0
     real, virtual = (result_in(tmp_path / name) for name in ("real", "virtual"))
-    # On a machine that has no time for it a command comes late; what follows is corrected for that.
+    # On a busy machine a command may be late; the following ones are corrected.
     until_s = min([each["time_s"] for each in real["corrections"]], default=float("inf"))
     same = [two for two in zip(real["commands"], virtual["commands"], strict=True) if two[0]["time_s"] < until_s]
     assert all(one["command"] == other["command"] for one, other in same)

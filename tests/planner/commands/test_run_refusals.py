@@ -1,4 +1,4 @@
-"""What `run` refuses before anything moves, through the command line, on an emulator that is asked where it is."""
+"""Plans that `run` refuses before anything moves, from the command line, on an emulator whose position is read."""
 
 import json
 import subprocess
@@ -22,7 +22,7 @@ Change = Callable[[Document], object]
 
 
 @pytest.fixture(scope="module")
-def stand_in(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
+def start_emulator(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
     """Yield the port and the control channel of a running emulator."""
     control = tmp_path_factory.mktemp("emulator") / "control"
     command = [sys.executable, "-m", "emulator", "--tcp", "0", "--control", str(control)]
@@ -35,7 +35,7 @@ def stand_in(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Pa
 
 
 def state_of(control: Path) -> tuple[float, float, float]:
-    """Return where the table is, by its own state."""
+    """Return the true position of the table."""
     status = ControlChannel(control).status()
     return status.reference_deg, status.encoder_deg, status.true_deg
 
@@ -59,7 +59,7 @@ def moved(joint: int, by_deg: float, first: int = 0, last: int = LOCATIONS) -> C
 
 
 def flip_the_wrist(document: Document) -> None:
-    """Hold the same poses in another configuration than the plan's."""
+    """Put the same poses into another configuration than the plan's."""
     joints, _ = inverse_kinematics(CELL.arm, CELL.arm.flange_poses(np.radians(JOINTS_DEG)))
     document["joints_deg"] = np.degrees(np.unwrap(joints[:, Configuration.LEFTY_ABOVE_FLIP], axis=0)).tolist()
 
@@ -83,8 +83,11 @@ REFUSED: dict[str, tuple[Change, str]] = {
         with_joints(JOINTS_DEG + np.array([120.0, 0.0, 0.0, 0.0, 0.0, 0.0])),
         "at location 13 joint 1 is at 172.0 deg, beyond its limit of 170 deg",
     ),
-    "joint 6 in a step": (moved(6, 61.0, 4), "at location 4 joint 6 moves at 610.0 deg/s from the location before"),
-    "joint 1 back in a step": (moved(1, -37.0, 7), "at location 7 joint 1 moves at -330.0 deg/s from the location"),
+    "joint 6 in a step": (moved(6, 61.0, 4), "at location 4 joint 6 moves at 610.0 deg/s from the previous location"),
+    "joint 1 back in a step": (
+        moved(1, -37.0, 7),
+        "at location 7 joint 1 moves at -330.0 deg/s from the previous location",
+    ),
     "a turn that is not carried along": (moved(6, 360.0, 9), "at location 9 joint 6 moves by 360.0 deg from the"),
     "joints that are lies": (
         lambda plan: plan["joints_deg"][3].__setitem__(0, 12.01),
@@ -92,7 +95,7 @@ REFUSED: dict[str, tuple[Change, str]] = {
     ),
     "a turned probe": (lambda plan: plan["joints_deg"][3].__setitem__(5, 0.01), "at location 3 its joints put the"),
     "a table elsewhere": (lambda plan: plan["cell"]["T_BT"][0].__setitem__(3, 600.0), "at location 0 its joints put"),
-    "another configuration": (flip_the_wrist, "at location 0 its joints are not LEFTY-ABOVE-NOFLIP"),
+    "another configuration": (flip_the_wrist, "at location 0 the joints are not in LEFTY-ABOVE-NOFLIP"),
     "no joints at a location": (lambda plan: plan["joints_deg"].__setitem__(2, [None] * 6), "joint 1 has no angle"),
     "the planner's own word": (
         lambda plan: plan.update(arm_fault="OUT_OF_REACH at location 5"),
@@ -100,10 +103,13 @@ REFUSED: dict[str, tuple[Change, str]] = {
     ),
     "limits that were lifted": (
         lambda plan: (moved(6, 720.0)(plan), plan["arm"]["upper_deg"].__setitem__(5, 3600.0)),
-        "its arm is not the arm that its map was made for",
+        "its arm is not the arm of its map",
     ),
     "a pause that hides a jump": (call_a_step_a_pause, "has been edited: the pause in step 7 contradicts the angles"),
-    "an earlier version's plan": (lambda plan: plan.pop("arm"), "plan anew with python -m planner plan short --out"),
+    "an earlier version's plan": (
+        lambda plan: plan.pop("arm"),
+        "create the plan again: python -m planner plan short --out",
+    ),
     "an arm that is none": (lambda plan: plan["arm"]["d_mm"].pop(), "must hold 6 finite numbers"),
     "a pose that is none": (
         lambda plan: plan["locations"][8][1].__setitem__(3, None),
@@ -113,7 +119,7 @@ REFUSED: dict[str, tuple[Change, str]] = {
         lambda plan: plan["cell"]["T_BT"][0].__setitem__(3, 10**400),
         "is damaged: OverflowError",
     ),
-    "an angle that is none": (lambda plan: plan["table"]["angles_deg"].__setitem__(0, 10**400), "holds no plan that"),
+    "an angle that is none": (lambda plan: plan["table"]["angles_deg"].__setitem__(0, 10**400), "contains no plan of"),
     "a limit that is missing": (lambda plan: plan["limits"].pop("speed_deg_s"), "is damaged: KeyError, 'speed_deg_s'"),
     "no poses": (lambda plan: plan.pop("locations"), "is damaged: KeyError, 'locations'"),
 }
@@ -121,14 +127,14 @@ REFUSED: dict[str, tuple[Change, str]] = {
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_an_arm_that_cannot_follow_is_refused_in_one_line_and_nothing_moves(
-    case: str, stand_in: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    case: str, start_emulator: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     change, sentence = REFUSED[case]
     plan_file = write_short_scan(tmp_path)
     document = json.loads(plan_file.read_text(encoding="utf-8"))
     change(document)
     plan_file.write_text(json.dumps(document), encoding="utf-8")
-    port, control = stand_in
+    port, control = start_emulator
     before = state_of(control)
     arguments = ["--port", port, "--control", str(control), "--out", str(tmp_path / "run")]
     assert main(["run", str(plan_file), *arguments]) == 2
@@ -154,9 +160,9 @@ def test_the_example_that_the_refusals_change_is_a_plan_that_runs(tmp_path: Path
 
 
 def test_a_table_that_turns_already_is_not_moved(
-    stand_in: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    start_emulator: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    port, control = stand_in
+    port, control = start_emulator
     plan_file = write_short_scan(tmp_path)
     with TableClient.open(port) as table:
         table.set_speed(20.0)
@@ -166,7 +172,7 @@ def test_a_table_that_turns_already_is_not_moved(
         arguments = ["--port", port, "--control", str(control), "--out", str(tmp_path / "run"), "--arm-away"]
         assert main(["run", str(plan_file), *arguments]) == 2
         said = capsys.readouterr().err
-        assert "deg and turns already; wait until it stands" in said
+        assert "deg and is already turning; wait until it stands" in said
         assert said.count("\n") == 1
         assert names_in(tmp_path / "run") == set()
     finally:

@@ -18,28 +18,16 @@ from planner.execution.run_input import RunInput
 from planner.kinematics.arm import Arm
 from planner.map.synthetic_maps import blocks_map
 from planner.planning import scan_planning
-from planner.planning.arm_motion import ArmMotion, arm_motion
-from planner.planning.plan import Plan
-from planner.planning.problem import Problem
+from planner.plans.arm_motion import ArmMotion, arm_motion
+from planner.plans.plan import Plan
+from planner.plans.problem import Problem
 from planner.scanning import scan_run
 from planner.scanning.scan_file import scan_document
 from planner.scanning.scan_report import scan_report
 from planner.scanning.scan_run import ScanOptions, run_on_port, scan_workpiece
 from planner.table.cost import PathCost
+from tests.planner.small_scan import SMALL
 
-SMALL = """
-[cell]
-workpiece_on_table = [0, 0, 80, 0, 0, 0]
-[workpiece]
-class = "cylinder"
-diameter_mm = 100
-height_mm = 100
-[path]
-pattern = "rings"
-bottom_margin_mm = 20
-scan_speed_mm_s = 25
-time_step_s = 0.5
-"""
 QUICK = ["--angles", "60", "--configuration", "LEFTY-ABOVE-NOFLIP"]
 EXACT = "[gears]\nbacklash_arcmin = 0.0\n"
 
@@ -223,7 +211,7 @@ def test_a_scan_that_meets_nothing_says_so_and_leaves_no_cloud(
         (["--port", "/dev/does-not-exist"], "cannot open"),
         (["--port", "emulator://?seed=x"], "cannot open"),
         (["--rate", "150"], "beyond the probe's 100"),
-        (["--configuration", "SIDEWAYS"], "no arm configuration"),
+        (["--configuration", "SIDEWAYS"], "is not an arm configuration"),
         (["--configuration", "RIGHTY-BELOW-FLIP"], "there is no plan"),
     ],
 )

@@ -5,8 +5,8 @@ from planner.execution.clear_path import BlockedPathError, check_ends, is_clear,
 from planner.execution.table_motion import TableMotion
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import blocks_map
-from planner.planning.plan import Plan, make_plan
-from planner.planning.problem import Problem
+from planner.plans.plan import Plan, make_plan
+from planner.plans.problem import Problem
 from planner.table.motion import Limits, roll_out
 
 
@@ -37,7 +37,7 @@ def test_the_start_is_reached_the_other_way_round_where_the_short_one_is_not_fre
 
 
 def free_by_small_steps(configuration_map: ConfigurationMap, from_deg: float, to_deg: float) -> bool:
-    """Tell whether each of many angles on the way is allowed at the first location."""
+    """Return whether each of many angles of the path is allowed at the first location."""
     count = 2 + round(abs(to_deg - from_deg) / 0.2)
     return all(configuration_map.is_allowed(0, float(angle)) for angle in np.linspace(from_deg, to_deg, count))
 
@@ -63,7 +63,7 @@ def test_the_way_to_the_start_is_the_shorter_of_the_free_ones(seed: int) -> None
 
 def test_without_a_clear_path_nothing_is_moved() -> None:
     walled_twice = blocks_map(8, 360, [(0, 7, 100, 120), (0, 7, 200, 220)], edge=0)
-    with pytest.raises(BlockedPathError, match="draw the arm back, and say so with --arm-away"):
+    with pytest.raises(BlockedPathError, match="retract the arm, and add --arm-away"):
         turns_to_start(walled_twice, 0.0, 150.0)
 
 

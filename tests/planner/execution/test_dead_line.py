@@ -1,4 +1,4 @@
-"""The line dies in mid-run: how far an emulated table runs on, and what the report says of it."""
+"""The line fails during a run: how far an emulated table runs on, and what the report states about it."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ from planner.execution.run_record import Record
 from planner.execution.table_motion import Phase, TableMotion
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import blocks_map
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
 from planner.table.wire import Wire
@@ -30,9 +30,9 @@ EVERY = 20
 def ways_after_a_cut(
     motion: TableMotion, limits: Limits, run_on_deg: float, every: int = EVERY
 ) -> tuple[Record, list[float]]:
-    """Run a motion, and return how far the table goes on when the line is cut at every so many readings.
+    """Run a motion, and return how far the table continues when the line is cut at regular readings.
 
-    Each way is that of a copy of the table which hears nothing any more, until it stands.
+    Each distance is that of a copy of the table that receives nothing any more, until it stands.
     """
     port = FaultyPort()
     snapshots: list[Snapshot] = []
@@ -40,6 +40,7 @@ def ways_after_a_cut(
 
     def look(_: int, __: int) -> None:
         if next(seen) % every == 0:
+            assert isinstance(port.table, Table)
             snapshots.append(port.table.snapshot())
 
     table, wire = TableClient(port, timeout_s=0.5), Wire()
@@ -98,7 +99,7 @@ def test_the_turn_of_a_pause_is_cut_short_too() -> None:
 
 
 def steady_motion() -> TableMotion:
-    """Return a motion at 10 deg/s from 0 deg, a location each 0.5 s."""
+    """Return a motion at 10 deg/s from 0 deg, with a location every 0.5 s."""
     accelerations = np.array([20.0] + [0.0] * 18 + [-20.0])
     angles, speeds = roll_out(0.0, 0.0, accelerations, 0.5)
     return TableMotion(Plan("", "", 0.5, angles, speeds, accelerations, PathCost(0.0, 0.0, 0.0)), Limits())
@@ -120,7 +121,7 @@ def test_a_way_on_that_stays_free_is_said_to() -> None:
 
 
 def test_a_region_that_only_the_way_on_meets_is_named_with_its_first_moment() -> None:
-    """The region is there at location 11 only, just ahead of the table, which is at 52.5 deg then."""
+    """The region is only at location 11, just ahead of the table, which is then at 52.5 deg."""
     verdict = judged(blocks_map(21, 360, [(11, 11, 54, 80)]))
     assert 0 < verdict.forbidden_moments < 100
     # With the arm between 10 and 11 it may already stand at 11.

@@ -1,4 +1,4 @@
-"""The pictures of a run, read back from what is drawn."""
+"""The plots of a run, read back from the drawing."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ LEAD_S, LAG_S, OFF_DEG = 0.05, 0.02, 0.07
 
 
 def stored_run() -> StoredRun:
-    """Return a run in which the encoder is off by a constant, beside its lag; its reference is early by the lead."""
+    """Return a run in which the encoder has a constant deviation besides its lag; the reference is early."""
     run_input = short_run_input()
     motion = run_input.motion()
     seen = []

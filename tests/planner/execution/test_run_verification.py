@@ -1,4 +1,4 @@
-"""The verdict, on records made by hand: what was seen is known exactly."""
+"""The verdict, on records with exactly known values."""
 
 from dataclasses import replace
 
@@ -39,7 +39,7 @@ def test_a_run_on_the_plan_is_verified_and_costs_what_was_planned(run_input: Run
 def test_a_run_beside_the_plan_has_deviated(run_input: RunInput) -> None:
     result = checked(run_input, 0.3)
     assert not result.is_verified
-    assert result.verdict == "deviated: 0.300 deg at a location, allowed are 0.25"
+    assert result.verdict == "deviated: 0.300 deg at a location; allowed: 0.25"
 
 
 def test_a_path_into_a_forbidden_cell_has_deviated(run_input: RunInput) -> None:
@@ -72,7 +72,7 @@ def test_a_latch_of_an_earlier_trigger_does_not_count(run_input: RunInput) -> No
 
 
 def margin_by_small_steps(configuration_map: ConfigurationMap, angles_deg: list[float]) -> float:
-    """Return how far the nearest forbidden angle is, found by going outwards from each angle in steps of 0.05 deg."""
+    """Return the distance of the nearest forbidden angle, searched outward from each angle in steps of 0.05 deg."""
     offsets_deg = np.arange(0.0, 180.0, 0.05)
     nearest = np.inf
     for location, angle_deg in enumerate(angles_deg):
@@ -90,7 +90,7 @@ def test_the_margin_is_that_of_a_search_in_small_steps(seed: int, run_input: Run
     plan, count = run_input.plan, len(run_input.plan.angles_deg)
     angle_count = int(rng.choice([24, 36, 90, 120]))
     values = rng.uniform(0.5, 1.0, (count, angle_count))
-    # Forbidden cells anywhere but beside the plan: round the turn and on both sides.
+    # Forbidden cells everywhere except near the plan: around the turn and on both sides.
     for location, angle_deg in enumerate(plan.angles_deg):
         sample = int(rng.integers(angle_count))
         way_deg = abs((sample * 360.0 / angle_count - angle_deg + 180.0) % 360.0 - 180.0)
@@ -114,7 +114,7 @@ def test_the_margin_of_a_run_that_was_not_seen_is_unknown(run_input: RunInput) -
 def test_commands_sent_ahead_make_the_reference_early_and_the_encoder_less_late(
     run_input: RunInput, lead_s: float
 ) -> None:
-    """A table made by hand: its reference is `lead_s` ahead of the plan's time, its encoder 20 ms behind that."""
+    """A synthetic table: its reference is `lead_s` ahead of the plan's time, its encoder 20 ms behind that."""
     lag_s, motion = 0.02, run_input.motion()
     times_s = np.arange(0.1, motion.column_times_s[-1] - 0.1, 0.01)
     seen = [

@@ -11,7 +11,7 @@ from planner.arrays import FloatArray
 from planner.execution.run_on import latest_s
 from planner.execution.stream import TimedCommand, check_it_fits, reference_states, rounded_stream, stream
 from planner.execution.table_motion import TableMotion
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
 from planner.table.wire import StreamError, Wire
@@ -37,7 +37,7 @@ def errors_of(motion: TableMotion, commands: tuple[TimedCommand, ...], times_s: 
     seed=st.integers(0, 10_000),
     step_s=st.sampled_from([0.06, 0.1, 0.25, 0.5, 1.0]),
     decimals=st.integers(1, 3),
-    # Limits that the wire can say: a plan at a speed of 1.75 cannot be followed with one decimal.
+    # Limits that can be transmitted: a plan at a speed of 1.75 cannot be followed with one decimal.
     limits=st.builds(Limits, st.integers(5, 400).map(lambda n: n / 10), st.integers(10, 1000).map(lambda n: n / 10)),
 )
 @settings(max_examples=20, deadline=None)
@@ -152,7 +152,7 @@ def test_what_does_not_fit_the_wire_is_refused_with_a_step_that_does() -> None:
     wire = Wire()
     quick = TableMotion(random_plan(generator, 0.04, 2.0, LIMITS), LIMITS)
     with pytest.raises(
-        StreamError, match=r"at 9600 baud.* step before lasts 40 ms; a time step of 0\.\d+ s"
+        StreamError, match=r"at 9600 baud.* previous step takes 40 ms; use a time step of at least 0\.\d+ s"
     ) as refusal:
         check_it_fits(stream(quick, LIMITS, wire), wire)
     fitting_s = float(str(refusal.value).split("a time step of ")[1].split()[0])

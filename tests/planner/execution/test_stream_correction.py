@@ -1,4 +1,4 @@
-"""What a stream makes up for, without a table: the reference is followed by the controller's own rules."""
+"""The corrections of a stream, without a table: the reference follows the controller's rules."""
 
 import pytest
 
@@ -98,5 +98,5 @@ def test_a_command_may_be_late_by_a_share_of_the_step_before() -> None:
 
 
 def test_commands_that_do_not_fit_the_line_are_refused() -> None:
-    with pytest.raises(StreamError, match="would fit"):
+    with pytest.raises(StreamError, match="use a time step of at least"):
         CorrectedStream(MOTION, LIMITS, Wire(baud=1200), 0.15, 3.0, 0.0, 90.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from planner.execution.table_motion import PauseTimes, Phase, TableMotion
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.table.cost import PathCost
 from planner.table.motion import Limits, roll_out
 from tests.planner.run_examples import paused_run_input, short_run_input

@@ -1,4 +1,4 @@
-"""The eye on a motion, here mostly that of a table which is to stand still, in virtual time."""
+"""Monitoring of a motion, here mostly of a table at rest, in virtual time."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.execution.run_record import Record
 from planner.execution.table_watch import StrayedError, TableWatch
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.scanning.latched_run import ReadingMotion
 from planner.table.cost import PathCost
 from planner.table.motion import Limits
@@ -33,7 +33,7 @@ def watch_on(
 
 
 def take_nothing(_time_s: float, _position_deg: float) -> None:
-    """Have no use for a reading."""
+    """Ignore a reading."""
 
 
 def times_s(record: Record, source: str) -> list[float]:

@@ -92,10 +92,12 @@ def test_a_box_is_as_far_from_a_field_as_the_points_in_it_say() -> None:
         points = (faces * half_mm) @ turn.T + place
         seen = min(look_up(*TUBE, *map(float, point)) for point in points)
         ours = bound(FIELD, turn, place, half_mm=half_mm, field=TUBE)
-        assert ours <= seen + DIAGONAL_MM  # of the finest grid's cells: what a look-up can be off
+        assert ours <= seen + DIAGONAL_MM  # cells of the finest grid: the error of a look-up
         if seen > 0.0:
             near += 1
-            assert ours >= seen - FIELD_TOLERANCE_MM - DIAGONAL_MM  # between the points it may be nearer still
+            assert (
+                ours >= seen - FIELD_TOLERANCE_MM - DIAGONAL_MM
+            )  # between the points the distance may be smaller still
     assert near > 20
 
 

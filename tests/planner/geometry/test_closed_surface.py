@@ -21,7 +21,7 @@ def block(x: float = 0.0, y: float = 0.0, z: float = 0.0, side_mm: float = 60.0)
 
 
 def mirrored(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Soup:
-    """A block whose faces across x are split as those of the block beside it."""
+    """A block whose faces across x are split like those of the adjacent block."""
     vertices, faces = block()
     return np.add(vertices * (-1.0, 1.0, 1.0), (x, y, z)), faces[:, ::-1]
 
@@ -33,7 +33,7 @@ def together(*parts: Soup) -> Soup:
 
 
 def loose(vertices: FloatArray, faces: IndexArray) -> Soup:
-    """Each triangle with corners of its own, as in STL."""
+    """Each triangle has its own corners, as in STL."""
     return vertices[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3)
 
 
@@ -151,5 +151,5 @@ def test_a_hole_is_refused_with_its_place(missing: int) -> None:
 
 
 def test_triangles_without_area_alone_make_no_surface() -> None:
-    with pytest.raises(WorkpieceError, match="no triangle with an area"):
+    with pytest.raises(WorkpieceError, match="no triangle with a nonzero area"):
         closed_surface(block()[0], np.array([[0, 0, 1], [2, 2, 2]]))

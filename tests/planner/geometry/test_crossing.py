@@ -30,7 +30,7 @@ def both(a: trimesh.Trimesh, b: trimesh.Trimesh) -> trimesh.Trimesh:
 def test_separate_bodies_do_not_cross_and_overlapping_ones_do(x_mm: float, y_mm: float, z_mm: float, seed: int) -> None:
     offsets = np.abs([x_mm, y_mm, z_mm])
     if (offsets < 1.0).any() or abs(offsets[0] - 100.0) < 1e-3:
-        return  # walls that lie upon each other have no crossing edges, or touch
+        return  # coincident walls have no crossing edges, or touch
     pair = both(box(), box(x_mm, y_mm, z_mm))
     pair.apply_transform(trimesh.transformations.random_rotation_matrix(np.random.default_rng(seed).random(3)))
     assert (first_crossing(pair) is not None) == (abs(x_mm) < 100.0)

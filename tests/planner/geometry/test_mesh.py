@@ -47,15 +47,15 @@ def test_a_sound_mesh_is_loaded_in_each_format(tmp_path: Path, suffix: str) -> N
 @pytest.mark.parametrize(
     ("mesh", "message"),
     [
-        (box(0.1), r"longest side is 0.1 mm; allowed is 10 to 1000 mm; is it in meters\?"),
+        (box(0.1), r"longest side is 0.1 mm; allowed: 10 to 1000 mm; is it in meters\?"),
         (box(0.5), r"longest side is 0.5 mm; .* is it in meters or inches\?"),
         (box(1.0), r"longest side is 1 mm; .* is it in meters or centimeters or inches\?"),
         (
             box(8.0),
             r"longest side is 8 mm; .* is it in centimeters or inches\? Then set unit in \[workpiece\], or --unit",
         ),
-        (box(0.001), "allowed is 10 to 1000 mm$"),
-        (box(5000.0), "longest side is 5000 mm; allowed is 10 to 1000 mm$"),
+        (box(0.001), "allowed: 10 to 1000 mm$"),
+        (box(5000.0), "longest side is 5000 mm; allowed: 10 to 1000 mm$"),
         (without_a_triangle(), "is open at 3 edges, the first near x "),
         (crossing(), r"crosses itself near x -?\d+"),
         (with_a_corner_at(np.nan), "a coordinate that is not a finite number"),
@@ -77,7 +77,7 @@ def test_a_unit_that_is_said_settles_the_size(tmp_path: Path, unit: str, mm: flo
 
 
 def test_a_size_that_the_said_unit_does_not_mend_is_not_asked_about_again(tmp_path: Path) -> None:
-    with pytest.raises(WorkpieceError, match=r"longest side is 5 mm; allowed is 10 to 1000 mm$"):
+    with pytest.raises(WorkpieceError, match=r"longest side is 5 mm; allowed: 10 to 1000 mm$"):
         load_mesh(saved(box(5.0), tmp_path / "part.stl"), "mm")
 
 

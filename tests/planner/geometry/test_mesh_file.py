@@ -144,11 +144,11 @@ def test_a_quad_with_a_notch_is_split_along_the_diagonal_inside(turn: int, tmp_p
 WRONG: dict[str, tuple[str, bytes, str]] = {
     "an empty STL": ("stl", b"", "the file is empty"),
     "no STL": ("stl", b"hello", "not an STL file"),
-    "a binary STL cut off": ("stl", binary_stl()[:-70], r"ends too early: its header announces 12 triangles"),
+    "a binary STL cut off": ("stl", binary_stl()[:-70], r"ends too early: its header specifies 12 triangles"),
     "a binary STL that announces too much": (
         "stl",
         binary_stl(2**31),
-        "ends too early: its header announces 2147483648",
+        "ends too early: its header specifies 2147483648",
     ),
     "a text STL cut off in a facet": ("stl", text_stl()[: text_stl().rindex(b"vertex")], "12 facets and 35 vertices"),
     "a text STL with a decimal comma": (
@@ -175,7 +175,7 @@ WRONG: dict[str, tuple[str, bytes, str]] = {
     "a PLY that announces too much": (
         "ply",
         ply().replace(b"vertex 8", b"vertex 99999999999"),
-        "announces 100000000011 lines",
+        "specifies 100000000011 lines",
     ),
     "a PLY index too large": (
         "ply",

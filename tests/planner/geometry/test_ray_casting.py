@@ -10,7 +10,7 @@ from planner.geometry.ray_casting import RayCaster
 
 
 def aimed_rays(count: int, radius_mm: float) -> tuple[FloatArray, FloatArray]:
-    """Return rays from all round a ball of that radius into its neighborhood, some of which miss it."""
+    """Return rays from all directions around a ball of that radius into its neighborhood; some of them miss it."""
     rng = np.random.default_rng(3)
     origins = rng.normal(size=(count, 3))
     origins *= 4.0 * radius_mm / np.linalg.norm(origins, axis=1, keepdims=True)
@@ -62,7 +62,7 @@ def test_triangles_without_area_are_passed_over() -> None:
         ((0.0, 0.0, -60.0), False),
         ((0.0, 60.0, 30.0), False),  # behind the other box
         ((0.0, 60.0, 130.0), True),  # over it
-        ((0.0, 14.0, 12.0), True),  # before it: what is behind the eye does not matter
+        ((0.0, 14.0, 12.0), True),  # before it: objects behind the eye do not matter
     ],
 )
 def test_an_eye_sees_a_point_that_faces_it_with_nothing_between(eye: tuple[float, float, float], is_seen: bool) -> None:

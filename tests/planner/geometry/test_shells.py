@@ -14,7 +14,7 @@ from planner.geometry.signed_distance_field import build_field, look_up
 from planner.geometry.winding_number import solid_angles
 
 SIDES_MM = (96.0, 72.0, 48.0, 24.0)
-"""Of boxes that lie in one another; the walls between them are 12 mm thick."""
+"""Nested boxes; the walls between them are 12 mm thick."""
 SOLID, CAVITY = False, True
 
 
@@ -43,7 +43,7 @@ def windings(mesh: trimesh.Trimesh, points: Sequence[Sequence[float]]) -> NDArra
 
 
 def in_walls(turn: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A point in each of the walls between the boxes, from outside inwards, and the middle."""
+    """A point in each of the walls between the boxes, from outside inward, and the middle."""
     return np.array([[side / 2 - 6.0, 1.0, 2.0] for side in SIDES_MM]) @ turn.T
 
 
@@ -57,7 +57,7 @@ def in_walls(turn: NDArray[np.float64]) -> NDArray[np.float64]:
 def test_body_cavity_body_cavity_are_told_apart_whichever_way_each_body_is_written(
     inverted: tuple[bool, bool], flipped: set[int], order: Sequence[int], seed: int
 ) -> None:
-    """A hollow box in the cavity of another one; each may be inside out, and some triangles on top of that."""
+    """A hollow box in the cavity of another one; each may be inside out, in addition to some triangles."""
     shells = [
         box(side, inverted=cavity ^ inverted[body])
         for side, cavity, body in zip(SIDES_MM, (SOLID, CAVITY, SOLID, CAVITY), (0, 0, 1, 1), strict=True)
@@ -66,7 +66,9 @@ def test_body_cavity_body_cavity_are_told_apart_whichever_way_each_body_is_writt
     mesh = together(*shells)
     mesh.vertices = mesh.vertices @ turn.T
     faces = np.array(mesh.faces)
-    per_box = {triangle // 12: triangle for triangle in flipped}  # at most one a box: most of it still tells
+    per_box = {
+        triangle // 12: triangle for triangle in flipped
+    }  # at most one per box: the rest still determines the orientation
     faces[list(per_box.values())] = faces[list(per_box.values()), ::-1]
     mended = outward(trimesh.Trimesh(mesh.vertices, faces[list(order)], process=False))
     assert np.rint(windings(mended, in_walls(turn).tolist())).tolist() == [1, 0, 1, 0]
@@ -102,7 +104,7 @@ def test_a_cavity_fills_a_cavity_of_a_body_that_another_body_surrounds() -> None
 
 @pytest.mark.parametrize("inverted", [False, True])
 def test_a_body_that_touches_the_wall_of_its_cavity_is_still_inside_it(inverted: bool) -> None:
-    inner = box(10.0, inverted=inverted, at=(15.0, 15.0, 15.0))  # three of its faces lie on the cavity's
+    inner = box(10.0, inverted=inverted, at=(15.0, 15.0, 15.0))  # three of its faces coincide with the cavity's
     mended = outward(together(box(60.0), box(40.0, inverted=True), inner))
     assert windings(mended, [[15.0, 15.0, 15.0], [0.0, 0.0, 0.0]]) == pytest.approx([1.0, 0.0])
 
@@ -114,7 +116,7 @@ def test_corners_at_one_position_are_one_corner() -> None:
 
 
 def test_a_surface_with_one_side_is_refused_with_the_place() -> None:
-    # A square's cone over a Moebius band, closed by a disc: its edges come in pairs, its sides do not.
+    # A square's cone over a Moebius band, closed by a disc: its edges are in pairs, its sides are not.
     u, v = np.meshgrid(np.arange(12), np.arange(6), indexing="ij")
     quad = np.stack((u, v), axis=-1).reshape(-1, 2)
 
@@ -128,5 +130,5 @@ def test_a_surface_with_one_side_is_refused_with_the_place() -> None:
         faces += [(a, b, c), (a, c, d)]
     klein = np.array(faces)
     vertices = np.random.default_rng(0).uniform(-50.0, 50.0, (72, 3))
-    with pytest.raises(WorkpieceError, match=r"disagree on which side is out, at \d+ edges, the first near x "):
+    with pytest.raises(WorkpieceError, match=r"are oriented inconsistently, at \d+ edges, the first near x "):
         turned_outward(vertices, klein)

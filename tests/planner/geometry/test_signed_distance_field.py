@@ -229,7 +229,7 @@ def test_any_part_on_any_grid_blocks_no_segment_that_is_free_of_it(
     enough_mm: float,
     seed: int,
 ) -> None:
-    """A segment beside the part's box, as far off as was asked and 2.5 grid spacings more."""
+    """A segment beside the part's box, at the requested distance plus 2.5 grid spacings."""
     mesh = random_part(kind, sizes_mm)
     mesh.apply_translation(place_mm)
     field = build_field(mesh, float(np.cbrt(np.prod(mesh.extents) / points)))

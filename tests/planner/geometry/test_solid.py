@@ -38,7 +38,7 @@ def test_a_capsule_is_as_far_from_a_solid_as_coal_says(kind: int) -> None:
             capsule, pose, ORACLES[kind](), coal.Transform3s.Identity(), request, coal.DistanceResult()
         )
         ours = distance(kind, a, b) - radius
-        if ours > -radius:  # deeper, the two libraries mean different depths
+        if ours > -radius:  # deeper inside, the two libraries define depth differently
             compared += 1
             assert ours == pytest.approx(oracle, abs=1e-4)
     assert compared > 300

@@ -1,4 +1,4 @@
-"""All models that trimesh keeps for its own tests: they load, or are refused for the right reason.
+"""All models of trimesh's own tests: they load, or are refused for the right reason.
 
 The folder is in trimesh's repository (github.com/mikedh/trimesh) and in no package; name it by TRIMESH_MODELS.
 """
@@ -18,7 +18,7 @@ from planner.geometry.mesh import load_mesh
 FOLDER = Path(os.environ.get("TRIMESH_MODELS", "no such folder"))
 REASONS = (
     "the file is empty|the mesh is empty|the mesh is open at|the mesh crosses itself near|this PLY file (lacks|ends)"
-    "|line \\d+: a face has 2 corners|a face with \\d+ corners|the triangles disagree"
+    "|line \\d+: a face has 2 corners|a face with \\d+ corners|the triangles are oriented"
 )
 
 

@@ -39,7 +39,7 @@ def test_a_name_is_read_however_people_write_it(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["", "LEFTY", "LEFTY-FLIP-ABOVE", "LEFTYABOVEFLIP", "all"])
 def test_another_name_is_refused_with_what_is_allowed(text: str) -> None:
-    with pytest.raises(ConfigurationNameError, match="write LEFTY or RIGHTY"):
+    with pytest.raises(ConfigurationNameError, match="use LEFTY or RIGHTY"):
         Configuration.parse(text)
 
 

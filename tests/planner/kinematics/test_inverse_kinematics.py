@@ -1,4 +1,4 @@
-"""The closed form against py-opw-kinematics, and against our own forward kinematics."""
+"""The closed form compared with py-opw-kinematics, and with our own forward kinematics."""
 
 from dataclasses import replace
 
@@ -59,7 +59,7 @@ def angle_between(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def away_from_singularities(arm: Arm, joints: FloatArray) -> npt.NDArray[np.bool_]:
-    """True for joints whose wrist, elbow and shoulder are each a little off the place where solutions meet."""
+    """True for joints whose wrist, elbow and shoulder are each a little away from the place where solutions meet."""
     wrist_center = arm.link_frames(joints)[:, 4, :3, 3]
     sense = -np.sign(arm.alpha_deg[0])
     elbow = sense * joints[:, 2] - np.arctan2(arm.d_mm[3], arm.a_mm[2])
@@ -171,7 +171,7 @@ KUKA = Arm.load("kuka_kr6_r700")
 
 
 def with_conventions(arm: Arm, sign: tuple[float, ...], offset_deg: tuple[float, ...]) -> Arm:
-    """The same arm, its angles counted in another way; the limits hold the same postures."""
+    """The same arm with another counting of its angles; the limits allow the same postures."""
     ends = (np.degrees(arm.limits) - offset_deg) * np.array(sign)
     lower, upper = np.sort(ends, axis=0)
     return replace(arm, sign=sign, offset_deg=offset_deg, lower_deg=tuple(lower), upper_deg=tuple(upper))

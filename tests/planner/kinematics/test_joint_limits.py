@@ -15,7 +15,7 @@ HOME_DEG = np.array([10.0, -60.0, 150.0, 20.0, 40.0, 30.0])
 
 
 def path(joint: int, angles_deg: Sequence[float]) -> FloatArray:
-    """Return joints that stay at home but for one, counted from 1."""
+    """Return joints at home except for one, counted from 1."""
     joints_deg = np.tile(HOME_DEG, (len(angles_deg), 1))
     joints_deg[:, joint - 1] = angles_deg
     return joints_deg
@@ -55,7 +55,7 @@ def test_every_joint_is_held_to_its_speed_either_way(joint: int, sign: float) ->
 
 def test_a_turn_that_is_not_carried_along_is_a_fault_though_the_joint_is_fast_enough() -> None:
     fault = first_joint_fault(VIPER, path(6, [170.0, -170.0]), 1.0)
-    assert str(fault) == ("at location 1 joint 6 moves by -340.0 deg from the location before, more than half a turn")
+    assert str(fault) == ("at location 1 joint 6 moves by -340.0 deg from the previous location, more than half a turn")
     assert first_joint_fault(VIPER, path(6, [170.0, 190.0]), 1.0) is None
 
 

@@ -15,7 +15,7 @@ HOME_DEG = np.array([10.0, -60.0, 150.0, 20.0, 40.0, 30.0])
 
 
 def sweep(joint: int, from_deg: float, to_deg: float, count: int = 50) -> FloatArray:
-    """Return joints in radians that stay at home but for one joint, counted from 1."""
+    """Return joints in radians at home except for one joint, counted from 1."""
     joints_deg = np.tile(HOME_DEG, (count, 1))
     joints_deg[:, joint - 1] = np.linspace(from_deg, to_deg, count)
     return np.asarray(np.radians(joints_deg))
@@ -89,7 +89,7 @@ def test_the_first_step_beyond_a_limit_is_named() -> None:
 def test_a_swing_of_the_wrist_whose_nearest_turns_spin_the_flange_is_refused() -> None:
     joints = np.radians(np.tile(HOME_DEG, (4, 1)))
     joints[:, 4] = np.radians(6.0)
-    # Joint 6 swings by -195 degrees against joint 4; the nearest turn is 165, along with it.
+    # Joint 6 moves by -195 degrees against joint 4; the nearest turn is 165, in the same direction.
     joints[2:, 3] += np.radians(165.0)
     joints[2:, 5] -= np.radians(195.0)
     result = path_through(VIPER, VIPER.flange_poses(joints), 1.0)

@@ -1,4 +1,4 @@
-"""What every arm that comes with the planner must do, whichever it is."""
+"""Required properties of every shipped arm."""
 
 from pathlib import Path
 

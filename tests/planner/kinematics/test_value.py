@@ -118,7 +118,7 @@ def test_a_factor_can_be_looked_at_on_its_own() -> None:
     assert value_function.only(["wrist"]).user_factors == ()
     assert value_function.only(["mine"]).user_factors == (mine,)
     assert value_function.only(["mine"]).factors == frozenset()
-    with pytest.raises(ValueError, match="'elbow' is no factor"):
+    with pytest.raises(ValueError, match="'elbow' is not a factor"):
         value_function.only(["elbow"])
 
 

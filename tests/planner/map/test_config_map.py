@@ -44,7 +44,7 @@ def test_a_point_is_allowed_only_if_every_sample_with_a_weight_is(seed: int, loc
         for k in {math.floor(location), math.ceil(location)}
         for i in {math.floor(position), math.ceil(position)}
     ]
-    # Within the tolerance of a sample, its neighbors have no say.
+    # Within the tolerance of a sample, its neighbors have no weight.
     if min(abs(x - round(x)) for x in (location, position)) > 1e-8:
         assert configuration_map.is_allowed(location, angle_deg) == all(corners)
 
@@ -111,7 +111,7 @@ def test_an_epsilon_that_forbids_all_or_nothing_is_refused(epsilon: float) -> No
 
 @pytest.mark.parametrize("location", [-0.1, 5.1, math.nan])
 def test_a_point_off_the_map_is_refused(location: float) -> None:
-    with pytest.raises(ConfigurationMapError, match="off the map"):
+    with pytest.raises(ConfigurationMapError, match="outside of the map"):
         random_map(1).value(location, 0.0)
 
 

@@ -30,7 +30,7 @@ STRETCHED_DEG = 106.966
 
 
 def problem(name: str, count: int) -> MapProblem:
-    """Return a shipped scan's problem, thinned out to a few locations."""
+    """Return a shipped scan's problem, reduced to a few locations."""
     whole = map_problem(load_scan(name))
     chosen = np.linspace(0, len(whole.T_WS) - 1, count).round().astype(int)
     return replace(whole, T_WS=whole.T_WS[chosen])
@@ -47,7 +47,7 @@ def mould(count: int = 24) -> MapProblem:
 
 
 def slow_cell(problem: MapProblem, location: int, angle_deg: float, slot: Configuration) -> tuple[float, int]:
-    """Return f_R and the reason of one cell, step by step as the paper's section 3 has them."""
+    """Return f_R and the reason of one cell, step by step as in the paper's section 3."""
     cell, value = problem.cell, problem.value
     goal = goal_flange_poses(cell, problem.T_WS[[location]], np.array([angle_deg]))[0]
     joints, reasons = inverse_kinematics(cell.arm, goal)
@@ -93,7 +93,7 @@ def test_the_map_is_what_the_paper_says_cell_by_cell(scene: Callable[[int], MapP
         for location in range(12):
             for i in range(n_angles):
                 value, reason = slow_cell(posed, location, 360.0 * i / n_angles, slot)
-                # A housing's clearance is known to two thousandths of a mm.
+                # The clearance of a housing is accurate to two thousandths of a mm.
                 assert maps[slot].values[location, i] == pytest.approx(value, abs=1e-4)
                 assert reasons_of(maps[slot])[location, i] == reason
                 seen.add(reason)
@@ -196,7 +196,7 @@ def test_a_users_factor_multiplies_into_the_map_and_may_forbid() -> None:
 
 def test_more_cells_than_memory_can_hold_are_refused_before_the_map_is_begun() -> None:
     done: list[tuple[int, int]] = []
-    with pytest.raises(ConfigurationMapError, match="57,600,000 cells; at most 50,000,000 are allowed: take fewer ang"):
+    with pytest.raises(ConfigurationMapError, match="57,600,000 cells; at most 50,000,000 are allowed; use fewer ang"):
         build_maps(cylinder(12), ALL, 600_000, lambda *now: done.append(now))
     assert done == []
 

@@ -121,7 +121,7 @@ def unnamed(_arrays: dict[str, NDArray[np.float64]], metadata: dict[str, object]
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (foreign, "no configuration maps that this program has written"),
+        (foreign, "no configuration maps of this program"),
         (newer, "format version is 2"),
         (too_great, r"damaged: .*1\.5"),
         (other_shape, "damaged: .*shape"),

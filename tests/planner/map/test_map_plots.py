@@ -11,13 +11,13 @@ from planner.map.config_map import ConfigurationMap
 from planner.map.map_colors import DARKEST_GRAY, colored
 from planner.map.map_plots import map_figure, plot_map, plot_map_cylinder
 from planner.map.map_reasons import FIRST_PAIR, reason_texts
-from planner.planning.plan import make_plan
-from planner.planning.plan_plots import plan_figure
-from planner.planning.problem import Problem
+from planner.plans.plan import make_plan
+from planner.plans.plan_plots import plan_figure
+from planner.plans.problem import Problem
 from planner.plot_style import DPI, WIDTH_IN
 from planner.reasons import Reason
 from tests.planner.drawn import Drawn
-from tools import figures
+from tools import paper_figures
 
 PAIRS = tuple(f"part {i} and table" for i in range(8))
 
@@ -67,7 +67,7 @@ def test_the_same_map_is_the_same_picture_to_the_byte(plot: type, tmp_path: Path
 
 
 def scattered_map() -> ConfigurationMap:
-    """Return a map without symmetry: other numbers of locations and angles, some dark cells here and there."""
+    """Return a map without symmetry: different numbers of locations and angles, some dark cells."""
     rng = np.random.default_rng(4)
     return ConfigurationMap(np.where(rng.random((12, 20)) < 0.3, 0.0, rng.uniform(0.6, 1.0, (12, 20))))
 
@@ -96,7 +96,7 @@ def test_a_plan_lies_on_the_map_in_the_colors_of_its_reasons() -> None:
 
 def map_of_the_paper() -> Figure:
     figure = Figure(figsize=(6.0, 4.0))
-    figures._draw_map(figure.subplots(), scattered_map())  # noqa: SLF001 - the part of Fig. 6 to 9 that draws the map
+    paper_figures._draw_map(figure.subplots(), scattered_map())  # noqa: SLF001 - the part of Fig. 6 to 9 that draws the map
     return figure
 
 

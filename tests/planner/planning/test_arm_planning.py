@@ -1,4 +1,4 @@
-"""Plans that the arm can follow: kept where it can anyway, found where there is one, and never taken at its word."""
+"""Plans that the arm can follow: unchanged if it can follow them, otherwise searched, and always verified."""
 
 from dataclasses import replace
 
@@ -18,17 +18,17 @@ from planner.map.config_map import ConfigurationMap
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import map_problem
 from planner.map.synthetic_maps import MapFamily, synthetic_map
-from planner.planning.arm_check import PlannedArm, arm_fault
-from planner.planning.arm_motion import arm_follows, arm_motion
-from planner.planning.arm_on_path import ArmOnPath
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.joint_turns import Margin
-from planner.planning.plan import Infeasibility, NoPlan, Plan
 from planner.planning.planners import PLANNERS
-from planner.planning.problem import Problem
 from planner.planning.scan_problem import scan_problem
 from planner.planning.smoothing import smooth
-from planner.planning.verification import verify
+from planner.plans.arm_check import PlannedArm, arm_fault
+from planner.plans.arm_motion import arm_follows, arm_motion
+from planner.plans.arm_on_path import ArmOnPath
+from planner.plans.plan import Infeasibility, NoPlan, Plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
+from planner.search.joint_turns import Margin
 from planner.table.motion import Limits, roll_out
 from tests.planner.exhaustive_search import is_forbidden_on_the_way
 from tests.planner.winding_arm import turns_after, winding_arm
@@ -94,7 +94,7 @@ def test_every_plan_is_one_for_table_and_arm(
 )
 def test_where_a_motion_is_known_one_is_found(seed: int, twist_deg: float, sense: float, step_s: float) -> None:
     random, limits = np.random.default_rng(seed), Limits()
-    # A table that undoes the twist as well as it can, a little unsteadily.
+    # A table that compensates the twist as well as it can, with small variations.
     speeds = -sense * np.minimum(twist_deg / step_s, limits.speed_deg_s) * random.uniform(0.7, 1.0, 24)
     gain = limits.acceleration_deg_s2 * step_s
     accelerations, speed = np.zeros(24), 0.0

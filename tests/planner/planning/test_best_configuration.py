@@ -3,8 +3,8 @@ import numpy as np
 from planner.map.config_map import ConfigurationMap
 from planner.planning.best_configuration import Comparison, best_configuration
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import Infeasibility, NoPlan, Plan
-from planner.planning.problem import Problem
+from planner.plans.plan import Infeasibility, NoPlan, Plan
+from planner.plans.problem import Problem
 from planner.reasons import Reason
 from tests.planner.winding_arm import winding_arm
 

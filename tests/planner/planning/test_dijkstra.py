@@ -6,11 +6,11 @@ import pytest
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.dijkstra import dijkstra, shortest_path
-from planner.planning.lattice import Lattice
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.plan import Infeasibility, NoPlan, Plan, make_plan
-from planner.planning.problem import Problem
-from planner.planning.verification import verify
+from planner.plans.plan import Infeasibility, NoPlan, Plan, make_plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
+from planner.search.lattice import Lattice
+from planner.search.lattice_choice import turn_lattice
 from planner.table.motion import Limits
 from tests.planner.exhaustive_search import is_forbidden_on_the_way, least_cost
 

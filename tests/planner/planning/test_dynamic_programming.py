@@ -15,11 +15,11 @@ from planner.map.map_problem import map_problem
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.dynamic_programming import dynamic_programming
 from planner.planning.interpolated_planner import interpolated_plan
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.lattice_search import best_motion
-from planner.planning.plan import Infeasibility, NoPlan, Plan, make_plan, path_cost
-from planner.planning.problem import Problem
 from planner.planning.scan_problem import scan_problem
+from planner.plans.plan import Infeasibility, NoPlan, Plan, make_plan, path_cost
+from planner.plans.problem import Problem
+from planner.search.lattice_choice import turn_lattice
+from planner.search.lattice_search import best_motion
 from planner.table.cost import Weights, default_weights
 from planner.table.motion import Limits, motion_through_angles
 from tests.planner.exhaustive_search import is_forbidden_on_the_way, least_cost, motion
@@ -42,7 +42,7 @@ def planned(problem: Problem) -> Plan:
 
 
 def lattice_cost(problem: Problem) -> float:
-    """Return the cost of the best path of a lattice with 20 speeds each way; infinite where it has none."""
+    """Return the cost of the best path of a lattice with 20 speeds in each direction; infinity if it has none."""
     lattice = turn_lattice(problem, 20, 10_000_000)
     assert lattice is not None
     best = best_motion(problem, lattice)
@@ -61,7 +61,7 @@ def test_on_a_tiny_map_the_verdict_and_the_cost_are_those_of_trying_every_motion
         assert math.isinf(optimum)
         assert outcome.infeasibility is not Infeasibility.NOT_FOUND
     else:
-        # Its accelerations are any, so it may cost less.
+        # Its accelerations are arbitrary, so it may cost less.
         assert outcome.cost.total <= optimum * 1.001
         assert not is_forbidden_on_the_way(problem.map, outcome)
 
@@ -193,13 +193,13 @@ def test_turning_the_map_turns_the_plan(seed: int, shift: int, turns: int) -> No
 
 
 def sign_changes(plan: Plan) -> int:
-    """Count how often the acceleration changes its sign, apart from what is below a hundredth of the limit."""
+    """Count how often the acceleration changes its sign, ignoring values below a hundredth of the limit."""
     accelerations = plan.accelerations_deg_s2[np.abs(plan.accelerations_deg_s2) > 1.0]
     return int(np.count_nonzero(np.diff(np.sign(accelerations))))
 
 
 def test_a_plan_is_smooth_by_itself() -> None:
-    # A bright band that swings: the table has to follow it, and need not tremble.
+    # A bright oscillating band: the table has to follow it smoothly.
     columns, samples = np.arange(80), np.arange(360)
     middle = 180.0 + 30.0 * np.sin(columns / 25.0)
     values = np.exp(-(((samples[None, :] - middle[:, None]) / 50.0) ** 2))

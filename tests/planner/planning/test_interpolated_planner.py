@@ -3,10 +3,10 @@ import pytest
 
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.interpolated_planner import interpolated_plan
-from planner.planning.plan import Plan
-from planner.planning.problem import Problem
-from planner.planning.state_grid import default_grid
-from planner.planning.verification import verify
+from planner.plans.plan import Plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
+from planner.search.state_grid import default_grid
 from tests.planner.exhaustive_search import is_forbidden_on_the_way, motion
 
 SMALL = MapFamily(0.1, 4.0, location_count=25, angle_count=40)

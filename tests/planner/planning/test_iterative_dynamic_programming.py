@@ -5,9 +5,9 @@ from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.interpolated_planner import interpolated_plan
 from planner.planning.iterative_dynamic_programming import best_around, refine, tube
-from planner.planning.plan import Plan, make_plan
-from planner.planning.problem import Problem
-from planner.planning.verification import verify
+from planner.plans.plan import Plan, make_plan
+from planner.plans.problem import Problem
+from planner.plans.verification import verify
 from planner.table.motion import roll_out
 from tests.planner.exhaustive_search import is_forbidden_on_the_way
 from tools.bench.planner_families import around_a_motion

@@ -4,8 +4,8 @@ import pytest
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.local_maxima import local_maxima
-from planner.planning.plan import NoPlan, Plan
-from planner.planning.problem import Problem
+from planner.plans.plan import NoPlan, Plan
+from planner.plans.problem import Problem
 
 
 def test_each_location_is_met_at_its_brightest_angle() -> None:

@@ -1,4 +1,4 @@
-"""Algorithm 2 and `evalpath` as they are to be read; each test says what the printed reading would do instead."""
+"""Algorithm 2 and `evalpath` as they must be read; each test describes the effect of the printed version."""
 
 import itertools
 
@@ -8,8 +8,6 @@ import pytest
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import NoPlan, Plan
-from planner.planning.problem import Problem
 from planner.planning.ray_shooting import (
     RayError,
     Rays,
@@ -20,6 +18,8 @@ from planner.planning.ray_shooting import (
     ray_cost,
     ray_shooting,
 )
+from planner.plans.plan import NoPlan, Plan
+from planner.plans.problem import Problem
 from planner.table.motion import Limits
 from tests.planner.exhaustive_search import is_forbidden_on_the_way, motion
 
@@ -56,7 +56,7 @@ def test_a_bright_motionless_ray_is_free() -> None:
 
 
 def test_after_leaving_the_allowed_region_every_remaining_step_costs_c_pen() -> None:
-    # As printed a ray that leaves early pays once, and so costs less than one that leaves late.
+    # As printed, a ray that leaves early pays once, and so costs less than one that leaves late.
     values = np.ones((9, 8))
     values[4, 2] = 0.0
     problem = Problem(ConfigurationMap(values))
@@ -70,7 +70,7 @@ def test_c_pen_exceeds_the_greatest_cost_of_an_allowed_step() -> None:
 
 
 def test_within_a_ray_the_speed_saturates() -> None:
-    # The printed algorithm forgets the limits.
+    # The printed algorithm omits the limits.
     problem = Problem(ConfigurationMap(np.ones((31, 8))))
     limit = problem.limits.speed_deg_s
     last_step = evalpath(problem, (0.0, limit), 100.0, 29, 30)
@@ -88,7 +88,7 @@ def test_the_accelerations_are_odd_symmetric_and_denser_near_zero() -> None:
 
 
 def test_of_equal_rays_the_one_of_least_acceleration_is_taken() -> None:
-    # All rays hit the wall in their first step and cost the same; the printed argmin would take full deceleration.
+    # All rays meet the wall in their first step and cost the same; the printed argmin would use full deceleration.
     values = np.ones((4, 8))
     values[1] = 0.0
     problem = Problem(ConfigurationMap(values))
@@ -98,7 +98,7 @@ def test_of_equal_rays_the_one_of_least_acceleration_is_taken() -> None:
 
 
 def test_the_rays_of_step_k_see_column_k_plus_1() -> None:
-    # As printed they start one column later, so a wall in column 1 would be met unseen.
+    # As printed they start one column later, so a wall in column 1 would not be detected.
     values = np.ones((6, 36))
     values[1, 10:13] = 0.0
     values[0, 9:12] = 0.1
@@ -127,7 +127,7 @@ def test_theta_advances_by_the_chosen_rays_first_step() -> None:
 
 
 def test_a_fallback_pauses_and_goes_on_at_rest() -> None:
-    # A wall across all that can be reached in time; as printed the speed before the fallback would live on.
+    # A wall across all reachable angles; as printed, the speed before the fallback would be kept.
     values = np.ones((12, 36))
     values[6, :20] = 0.0
     problem = Problem(ConfigurationMap(values), start_angle_deg=90.0, start_speed_deg_s=30.0)

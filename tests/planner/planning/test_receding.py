@@ -5,11 +5,11 @@ import pytest
 
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
-from planner.planning.cost_to_go import lay_out_columns
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import NoPlan, Plan
-from planner.planning.problem import Problem
 from planner.planning.receding import HorizonError, online_step, prepare_online_step, receding
+from planner.plans.plan import NoPlan, Plan
+from planner.plans.problem import Problem
+from planner.search.cost_to_go import lay_out_columns
 from tests.planner.exhaustive_search import is_forbidden_on_the_way
 
 FAMILY = MapFamily(0.3, 5.0, location_count=60, angle_count=60)

@@ -1,4 +1,4 @@
-"""The same arm, counted as other makers do: planning and margins must not depend on how a robot counts its joints."""
+"""The same arm with another counting of its joints: planning and margins must not depend on it."""
 
 from dataclasses import replace
 
@@ -7,12 +7,12 @@ import pytest
 
 from planner.kinematics.arm import Arm
 from planner.map.config_map import ConfigurationMap
-from planner.planning.arm_motion import ArmMotion, arm_motion
-from planner.planning.arm_on_path import ArmOnPath
-from planner.planning.arm_plots import arm_figure
-from planner.planning.joint_turns import Margin, lay_out_turns
-from planner.planning.plan import make_plan
-from planner.planning.problem import Problem
+from planner.plans.arm_motion import ArmMotion, arm_motion
+from planner.plans.arm_on_path import ArmOnPath
+from planner.plans.arm_plots import arm_figure
+from planner.plans.plan import make_plan
+from planner.plans.problem import Problem
+from planner.search.joint_turns import Margin, lay_out_turns
 from tests.planner.winding_arm import winding_arm
 
 SIGN = np.array([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0])

@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
-from planner.planning.plan import Infeasibility, NoPlan, Pause, Plan
-from planner.planning.problem import Problem
 from planner.planning.rotate_when_blocked import nearest_allowed_angle, rotate_when_blocked
+from planner.plans.plan import Infeasibility, NoPlan, Pause, Plan
+from planner.plans.problem import Problem
 from tests.planner.exhaustive_search import is_forbidden_on_the_way
 
 

@@ -3,11 +3,11 @@ import pytest
 
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
-from planner.planning.plan import Plan, make_plan
-from planner.planning.problem import Problem
 from planner.planning.ray_shooting import ray_shooting
 from planner.planning.receding import receding
 from planner.planning.smoothing import smooth
+from planner.plans.plan import Plan, make_plan
+from planner.plans.problem import Problem
 from planner.table.motion import roll_out
 from tests.planner.exhaustive_search import is_forbidden_on_the_way, motion
 

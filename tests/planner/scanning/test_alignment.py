@@ -35,6 +35,6 @@ def test_a_turned_table_turns_the_cloud_back() -> None:
     cell = Cell()
     still = probe_poses(Calibration.of(cell), np.eye(4)[np.newaxis], np.array([0.0]))[0]
     turned = probe_poses(Calibration.of(cell), np.eye(4)[np.newaxis], np.array([90.0]))[0]
-    # A point that stands still beside a table that turns by +90 deg moves by -90 deg on it.
+    # A fixed point beside a table that turns by +90 deg moves by -90 deg on it.
     point = (still @ rigid_inverse(still) @ (100.0, 0.0, 30.0, 1.0))[:3]
     assert np.abs((turned @ rigid_inverse(still) @ (*point, 1.0))[:3] - (0.0, -100.0, 30.0)).max() < 1e-9

@@ -25,7 +25,7 @@ RADIUS_MM = 15.0
 
 
 def off(T: FloatArray, other: FloatArray) -> tuple[float, float]:
-    """Return how far two poses are apart, in mm and deg."""
+    """Return the distance of two poses, in mm and deg."""
     difference = rigid_inverse(T) @ other
     return float(np.linalg.norm(difference[:3, 3])), float(
         np.degrees(Rotation.from_matrix(difference[:3, :3]).magnitude())
@@ -33,7 +33,7 @@ def off(T: FloatArray, other: FloatArray) -> tuple[float, float]:
 
 
 def nominal_of(true: Calibration, rng: np.random.Generator) -> Calibration:
-    """Return placements as a drawing would give them: some mm and some degrees off."""
+    """Return placements as from a drawing, with errors of some mm and some degrees."""
     probe = placement(*rng.normal(0.0, 3.0, 3), 0.0, 0.0, 0.0) @ placement(0.0, 0.0, 0.0, 40.0, rng.normal(0, 4), -40.0)
     table = placement(*rng.normal(0.0, 3.0, 2), 0.0, 0.0, 0.0, 0.0) @ placement(0.0, 0.0, 0.0, 70.0, 1.0, -70.0)
     return Calibration(true.T_FS @ probe, true.T_BT @ table, true.T_TW)
@@ -49,10 +49,10 @@ def test_both_calibrations_find_the_cell_within_what_they_promise(seed: int) -> 
     )
     found = calibrate_cell(true, nominal_of(true, rng), LaserProbe(), seed)
     distance_mm, angle_deg = off(found.calibration.T_FS, true.T_FS)
-    # Three coordinates, of which none is worse than the figure given, at 4 sigma.
+    # Three coordinates, none of them worse than the given figure, at 4 sigma.
     assert distance_mm < 4.0 * np.sqrt(3.0) * found.probe.uncertainty_mm < 0.05
     assert angle_deg < 4.0 * np.sqrt(3.0) * found.probe.uncertainty_deg < 0.05
-    assert found.probe.rms_mm < 0.025  # noise along the ray is less across the surface
+    assert found.probe.rms_mm < 0.025  # noise along the ray is smaller perpendicular to the surface
     tilt = np.cross(found.calibration.T_BT[:3, 2], true.T_BT[:3, 2])
     assert np.degrees(np.linalg.norm(tilt)) < 0.002
     # The axis passes the true one at the height of the table's top.
@@ -160,15 +160,15 @@ def an_empty_view() -> object:
 @pytest.mark.parametrize(
     ("views", "message"),
     [
-        (moved_sphere, r"mm \(rms\) off one sphere .* elsewhere from view 11 on: did it move"),
-        (another_sphere, r"mm \(rms\) off one sphere .* fit one of 15.0.. mm better: is this the sphere"),
+        (moved_sphere, r"mm \(rms\) off one sphere .* changes at view 11; check that it did not move"),
+        (another_sphere, r"mm \(rms\) off one sphere .* fit one of 15.0.. mm better; check that this is the sphere"),
         (always_on_the_same_side, r"fit two places of the probe equally well, 1[78]\.. mm apart"),
         (radius_in_meters, "must all be in mm"),
         (points_in_meters, "must all be in mm"),
         (noise_larger_than_given, "1.2. times the probe's noise"),
         (a_pose_that_is_nan, "not a finite number"),
         (always_in_the_middle, "fit two places of the probe equally well, 180 deg apart"),
-        (always_the_same_direction, "two places|leave the probe's place open"),
+        (always_the_same_direction, "two places|leave the probe's pose open"),
         (too_few_views, "5 flange poses and 5 views .* at least 6"),
         (an_empty_view, "view 4 of the sphere has fewer than 3 points"),
     ],
@@ -180,7 +180,7 @@ def test_views_that_do_not_determine_the_probes_place_are_refused(views: Callabl
 
 @pytest.mark.parametrize(("beside_mm", "count"), [(-4.0, 8), (8.0, 14)])
 def test_the_place_beyond_the_lasers_plane_is_looked_at_as_well(beside_mm: float, count: int) -> None:
-    """All turns of the probe lead to the true place here: only the fit that begins beyond the plane finds the other."""
+    """All rotations of the probe lead to the true pose here: only the fit from beyond the plane finds the other."""
     beside = views_of(CENTER, count, LaserProbe()) @ placement(0.0, beside_mm, 0.0, 0.0, 0.0, 0.0)
     T_BF, points = seen_from(TRUE.T_FS, beside)
     with pytest.raises(CalibrationError, match=r"fit two places of the probe equally well, .* mm apart"):
@@ -221,7 +221,7 @@ def test_the_deviation_of_a_center_is_that_of_repeated_measurements() -> None:
         profiles = [profile_of_sphere(probe, T, CENTER, RADIUS_MM, rng) @ T[:3, :3].T + T[:3, 3] for T in poses]
         found.append(fit_sphere(np.concatenate(profiles), RADIUS_MM, probe.noise_mm))
     scatter = np.std([each.center for each in found], axis=0)
-    # Noise along the ray shows less across the surface, so that the deviation given is never too small.
+    # Noise along the ray is smaller perpendicular to the surface, so that the given deviation is never too small.
     assert (scatter < 1.2 * found[0].deviations_mm).all()
     assert (scatter > 0.5 * found[0].deviations_mm).all()
 
@@ -267,7 +267,7 @@ def test_an_exact_circle_gives_the_exact_axis_from_a_poor_nominal() -> None:
 def test_the_residual_is_that_of_the_centers() -> None:
     noisy = centers() + np.random.default_rng(0).normal(0.0, 0.01, (8, 3))
     found = calibrate_table_axis(noisy, ANGLES_DEG, TRUE.T_BT)
-    # 24 coordinates less 7 unknowns.
+    # 24 coordinates minus 7 unknowns.
     assert found.rms_mm == pytest.approx(0.01 * np.sqrt(17.0 / 8.0), rel=0.5)
     assert found.residuals_mm.shape == (8,)
 
@@ -279,7 +279,7 @@ def test_the_residual_is_that_of_the_centers() -> None:
         (centers(REPEATED_DEG), REPEATED_DEG, "the 8 table angles are only 2 distinct places; .* at least 4"),
         (centers(WRAPPED_DEG), WRAPPED_DEG, "the 5 table angles are only 3 distinct places"),
         (noisy(CLOSE_DEG, 0.05), CLOSE_DEG, r"axis open by .* mm and .* deg .* 150 mm radius .* allowed are 0.1 mm"),
-        (noisy(ANGLES_DEG, 0.02, 1.0), ANGLES_DEG, "elsewhere from center 5 on: did it move on the table"),
+        (noisy(ANGLES_DEG, 0.02, 1.0), ANGLES_DEG, "changes at center 5; check that it did not move"),
         (centers()[:5], ANGLES_DEG, "5 sphere centers and 8 table angles"),
         (centers(ANGLES_DEG / 8.0), ANGLES_DEG / 8.0, "span only 39 deg"),
         (centers(radius_mm=5.0), ANGLES_DEG, "only 5.0 mm radius"),

@@ -17,7 +17,7 @@ def over(mesh: trimesh.Trimesh, T_WS: FloatArray) -> Coverage:
 
 
 def strips(height_mm: float, lines_x_mm: tuple[float, ...], step_mm: float = 1.0) -> FloatArray:
-    """Return poses that look down, moving along y in strips whose middles are at some x."""
+    """Return poses that look down and move along y, in strips with given middles in x."""
     along = np.arange(-60.0, 60.0, step_mm)
     return np.stack([placement(x, y, height_mm, 0.0, 180.0, 180.0) for x in lines_x_mm for y in along])
 

@@ -1,4 +1,4 @@
-"""The picture of a cloud's deviation, read back: which parts are unrolled, and what is where in the picture."""
+"""The plot of a cloud's deviation, read back: unrolled parts, and positions in the picture."""
 
 import numpy as np
 import pytest

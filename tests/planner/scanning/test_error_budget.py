@@ -37,7 +37,7 @@ def poses_round_the_block() -> FloatArray:
 def made_up_chain(
     decimals: int, backlash_deg: float = 0.08, off_mm: float = 0.02, counts_per_deg: float = 512.0
 ) -> Chain:
-    """Return a run whose errors are known, with poses in the place of joints: row k of `joints` is its number."""
+    """Return a run whose errors are known, with poses instead of joints: row k of `joints` is its number."""
     rng = np.random.default_rng(2)
     true_deg: FloatArray = rng.uniform(0.0, 360.0, PROFILES)
     edge_deg = true_deg + 0.001

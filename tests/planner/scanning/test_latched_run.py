@@ -24,7 +24,7 @@ def test_profiles_come_at_the_probes_rate_and_most_are_paired(sound: LatchedRun)
     assert sound.triggers == pytest.approx(25 * 4.0, abs=3)
     assert np.diff(sound.times_s) == pytest.approx(np.diff(sound.numbers) / 25.0)
     assert len(sound.numbers) + len(sound.dropped) == sound.triggers
-    # Three commands and their answers take a period; then one latch in twelve is overwritten before it is read.
+    # Three commands and their replies take a period; then one latch in twelve is overwritten before it is read.
     assert len(sound.dropped) <= 0.12 * sound.triggers
     assert set(sound.dropped.values()) <= {Drop.TABLE_UNREAD}
 
@@ -69,7 +69,7 @@ def test_what_is_told_of_a_table_is_that_table_s(name: str, tmp_path: Path) -> N
     )
     run = latched_run(TriggerConditions(rate_hz=40.0), decimals=4, query=f"&config={config}")
     assert run.failure is None
-    step_deg = 360.0 / (4 * lines * 480.0)  # four counts a line, before gears of 480:1
+    step_deg = 360.0 / (4 * lines * 480.0)  # four counts per line, before gears of 480:1
     encoder_deg = run.latched_deg - run.shaft_deg
     # Within a tick the shaft is followed by a straight line here, and by a parabola at the latch.
     assert np.abs(encoder_deg).max() <= 0.5 * step_deg + 0.0015
@@ -95,7 +95,7 @@ def test_a_table_that_lags_more_than_the_emulator_loses_no_profile_for_it(tmp_pa
 
 
 def kept_among(sound: LatchedRun, count: int) -> frozenset[int]:
-    """Return some profiles that are paired when nothing is wrong, taken while the table turns fast."""
+    """Return some profiles that are paired without a fault, taken while the table turns fast."""
     speeds = np.abs(np.gradient(sound.true_deg, sound.times_s))
     return frozenset(sound.numbers[speeds > 8.0][5 :: max(1, int((speeds > 8.0).sum() / count))].tolist())
 
@@ -119,7 +119,7 @@ def test_a_trigger_fault_drops_at_most_its_own_profiles(sound: LatchedRun, fault
 
 def test_a_table_that_hears_no_trigger_gives_nothing_and_says_why() -> None:
     deaf = TriggerConditions(faults=TriggerFaults(robot_misses=frozenset(range(1000))))
-    with pytest.raises(NothingScannedError, match=r"all \d+ profiles were dropped, most because the robot latched"):
+    with pytest.raises(NothingScannedError, match=r"all \d+ profiles were dropped, mostly because the robot latched"):
         latched_run(deaf)
 
 
@@ -129,7 +129,7 @@ def test_profiles_are_taken_on_the_path_only(sound: LatchedRun) -> None:
 
 
 class SlowView:
-    """A view into a table through which the first look takes long."""
+    """A ground truth whose first reading takes long."""
 
     def __init__(self, table: GroundTruth, clock: Clock, first_look_s: float) -> None:
         self.trigger = table.trigger

@@ -25,7 +25,7 @@ def robot_of(times_s: list[float]) -> list[RobotLatch]:
 
 
 def table_of(edges_s: list[float], reads_s: list[float]) -> list[TableReading]:
-    """Return what a table says that latches at some times and is read at others."""
+    """Return the replies of a table that latches at some times and is read at others."""
     readings = []
     for read_s in reads_s:
         latched = [edge for edge in edges_s if edge <= read_s]
@@ -51,7 +51,7 @@ def doubled(times_s: list[float], number: int, after_s: float) -> list[float]:
 
 
 def assert_paired_but(pairing: Pairing, dropped: dict[int, Drop]) -> None:
-    """Each profile but the dropped ones has the pose and the angle of its own trigger."""
+    """Each profile except the dropped ones has the pose and the angle of its own trigger."""
     assert pairing.dropped == dropped
     assert pairing.numbers.tolist() == [k for k in range(COUNT) if k not in dropped]
     times_s = np.array(TIMES_S)[pairing.numbers]
@@ -79,7 +79,7 @@ def test_without_faults_every_profile_is_paired() -> None:
         ),
         (lambda: paired(reads_s=without(READS_S, 7)), {7: Drop.TABLE_UNREAD}),
         (lambda: paired(reads_s=[*without(READS_S, 7), TIMES_S[8] + 0.001]), {7: Drop.TABLE_UNREAD}),
-        # On its way while the next trigger comes: it may be either's.
+        # In transmission while the next trigger comes: it may belong to either.
         (lambda: paired(reads_s=[*without(READS_S, 7), TIMES_S[8] - 0.001]), {7: Drop.TABLE_UNREAD}),
         (lambda: paired(reads_s=sorted(READS_S + [time_s + 0.015 for time_s in TIMES_S])), {}),
         (lambda: paired(robot_s=without(TIMES_S, 5), edges_s=without(TIMES_S, 5)), {5: Drop.ROBOT_MISSED}),
@@ -112,7 +112,7 @@ def test_no_mixture_of_faults_gives_a_profile_another_ones_pose(
     assert (np.abs(pairing.angles_deg - [angle_at(time_s) for time_s in times_s]) <= 0.13 + 1e-9).all()
     faulty = robot_misses | table_misses | unread
     assert set(pairing.dropped) >= robot_misses | unread
-    if len(table_misses) <= 2:  # so that most readings around each are sound
+    if len(table_misses) <= 2:  # so that most readings around each are correct
         assert set(pairing.dropped) == faulty
 
 

@@ -15,7 +15,7 @@ MARK = np.array([1.0, 0.0, 0.0])
 
 
 def marked(azimuth_deg: float, elevation_deg: float, point: tuple[float, float, float]) -> "tuple[int, int] | None":
-    """Return row and column of the middle of a red mark at a point of the surface; None where it is hidden."""
+    """Return row and column of the middle of a red mark at a point of the surface; None if it is hidden."""
     view = View.of(BLOCK, azimuth_deg, elevation_deg)
     image = painted(view, RayCaster(BLOCK), np.array([point]), MARK[np.newaxis], 5)
     red = np.argwhere((image[:, :, 0] > 0.3) & (image[:, :, 1] < 0.05))
@@ -23,7 +23,7 @@ def marked(azimuth_deg: float, elevation_deg: float, point: tuple[float, float, 
 
 
 def test_seen_from_the_front_x_is_to_the_right_and_z_is_up() -> None:
-    """From -y, a little above: what a person in front of the part sees."""
+    """From -y, a little above: the view of a person in front of the part."""
     left, right, low, high = (
         marked(-90.0, 10.0, point)
         for point in ((-40.0, -30.0, 20.0), (40.0, -30.0, 20.0), (0.0, -30.0, 5.0), (0.0, -30.0, 35.0))
@@ -59,6 +59,6 @@ def test_a_mark_lies_on_the_pixel_where_the_bare_part_has_the_same_depth() -> No
         surface_mm = view.surface(caster)[1][rows, columns]
         off_mm = depths_mm - surface_mm
         seen = np.abs(off_mm) < 1.5 * view.pixel_mm + 0.5
-        # Points are on what is seen or behind it, never in front; about half of them are seen.
+        # Points are on the visible surface or behind it, never in front; about half of them are visible.
         assert np.nanmin(off_mm) > -6.0 * view.pixel_mm
         assert 0.25 < seen.mean() < 0.75

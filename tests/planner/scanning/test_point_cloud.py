@@ -20,7 +20,7 @@ def write(file: Path, block: int) -> None:
 
 
 def properties(file: Path) -> Any:  # noqa: ANN401 - a structured array
-    """Read a file by its header, as any program would."""
+    """Read a file by its header, like any program."""
     header, _, body = file.read_bytes().partition(b"end_header\n")
     names = [line.split() for line in header.decode("ascii").splitlines() if line.startswith("property")]
     kinds = {"float": "<f4", "uint": "<u4"}

@@ -37,7 +37,7 @@ def tracked(
     may_decide: Callable[[int], bool] = lambda _: True,
     ticks: int = 2000,
 ) -> tuple[list[Step], Blocked | None]:
-    """Step through a map; `revealed_at` says how many locations the source has sent by a tick of the clock."""
+    """Step through a map; `revealed_at` gives the number of locations that are known at a tick of the clock."""
     steps: list[Step] = []
     for tick in range(ticks):
         while planner.revealed.room > 0 and planner.revealed.count < min(revealed_at(tick), map_.location_count):

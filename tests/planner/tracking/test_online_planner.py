@@ -1,4 +1,4 @@
-"""Whatever becomes known, and whenever: the table can always come to rest in view, and touches nothing forbidden."""
+"""Whatever becomes known, and whenever: the table can always come to rest in view, and touches no forbidden region."""
 
 from itertools import pairwise
 
@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, blocks_map, synthetic_map
 from planner.planning.dynamic_programming import dynamic_programming
-from planner.planning.plan import Pause, Plan, path_cost
-from planner.planning.problem import Problem
+from planner.plans.plan import Pause, Plan, path_cost
+from planner.plans.problem import Problem
 from planner.table.motion import Limits
 from planner.tracking.decision import Method, RayShooting, Receding
 from planner.tracking.online_planner import Blocked, Kind, OnlinePlanner, Why

@@ -1,6 +1,7 @@
 """A short scan to track, and the locations of its path as a program sends them."""
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.cell.scan import Scan, load_scan
 from planner.defaults import SCANS
-from planner.geometry.transforms import to_xyz_yaw_pitch_roll
+from planner.kinematics.arm import Arm
 from planner.kinematics.configuration import Configuration
 from planner.map.map_problem import map_problem
 from planner.table.wire import Wire
@@ -34,13 +35,13 @@ def locations(count: int = LOCATIONS) -> FloatArray:
 
 def lines(T_WS: FloatArray, end: bool = True) -> list[str]:
     """Return locations as a program sends them."""
-    sent = [json.dumps(row) for row in to_xyz_yaw_pitch_roll(T_WS).tolist()]
+    sent = [json.dumps(row) for row in T_WS.reshape(-1, 16).tolist()]
     return [*sent, '"end"'] if end else sent
 
 
 def write_scan(folder: Path, step_s: float = 0.5) -> Path:
     """Write a scan of the first locations, and return its file."""
-    rows = to_xyz_yaw_pitch_roll(locations()).tolist()
+    rows = locations().reshape(-1, 16).tolist()
     (folder / "path.csv").write_text("\n".join(",".join(map(repr, row)) for row in rows) + "\n", encoding="utf-8")
     text = (SCANS / "cylinder.toml").read_text(encoding="utf-8")
     before, _, after = text.partition("[path]")
@@ -50,24 +51,20 @@ def write_scan(folder: Path, step_s: float = 0.5) -> Path:
     return file
 
 
-def new_tracker(wire: Wire | None = None, step_s: float | None = None, **settings: object) -> Tracker:
+def new_tracker(view: int = 8, step_s: float | None = None, arm: Arm | None = None) -> Tracker:
     """Return a tracker of the cylinder in one configuration, on a coarse map."""
-    scan = cylinder()
+    scan, problem = cylinder(), map_problem(cylinder())
+    if arm is not None:
+        problem = replace(problem, cell=replace(problem.cell, arm=arm))
+    settings = TrackSettings(view=view)
     return Tracker(
-        map_problem(scan),
-        step_s or scan.path.step_s,
-        scan.limits,
-        scan.weights,
-        wire,
-        TrackSettings(**settings),  # type: ignore[arg-type] # a test's own fields
-        [CONFIGURATION],
-        ANGLES,
+        problem, step_s or scan.path.step_s, scan.limits, scan.weights, Wire(), settings, [CONFIGURATION], ANGLES
     )
 
 
-def begun_tracker(T_WS: FloatArray, **settings: object) -> Tracker:
-    """Return a tracker that rests at the start and knows its first view."""
-    tracker = new_tracker(**settings)
+def begun_tracker(T_WS: FloatArray, view: int = 8, arm: Arm | None = None) -> Tracker:
+    """Return a tracker that rests at the start and has its first view."""
+    tracker = new_tracker(view, arm=arm)
     for T in T_WS[: tracker.room]:
         tracker.reveal(T)
     if tracker.count == len(T_WS):
@@ -87,7 +84,7 @@ def asked(tracker: Tracker) -> Tracked | None:
 
 def steps_to_the_end(tracker: Tracker, T_WS: FloatArray) -> list[Step]:
     """Track a path whose locations come as soon as there is room, and return the steps."""
-    steps = []
+    steps: list[Step] = []
     while True:
         for T in T_WS[tracker.count : tracker.count + tracker.room]:
             tracker.reveal(T)

@@ -1,6 +1,6 @@
-"""A right table of another make: written from docs/protocol.md alone, in closed form, with nothing of the emulator's.
+"""A conforming third-party table: written from docs/protocol.md alone, in closed form, without code of the emulator.
 
-Its motor follows the reference at once; its encoder is coarse; how fast it answers and talks is for each test to say.
+Its motor follows the reference at once; its encoder is coarse. Each test sets the speed of its replies.
 """
 
 import math
@@ -18,7 +18,7 @@ _LEAST_SETTING = Fraction(1, 1000)
 
 @dataclass(frozen=True)
 class Make:
-    """What tables of this make differ in."""
+    """The differences between these tables."""
 
     counts_per_deg: int = 20
     decimals: int = 3
@@ -27,18 +27,18 @@ class Make:
     error_replies: bool = False
     baud: int = 9600
     latency_s: float = 0.08
-    """From the CR of a command to the first byte of its reply."""
+    """Time from the CR of a command to the first byte of its reply."""
     profile_latency_s: float | None = None
-    """What the profile says of it, where that is not the truth."""
+    """The values of the profile, if they differ from the true ones."""
     acts_after: float = 0.5
-    """The share of the latency after which the command is carried out."""
+    """The share of the latency after which the command is executed."""
     reply_end: bytes = b"\r"
     is_busy_meanwhile: bool = False
-    """Whether a line waits in the buffer until the one before it is answered."""
+    """Whether a line waits in the buffer until the previous one has its reply."""
 
     @property
     def profile(self) -> str:
-        """What its maker writes into the profile."""
+        """The profile of its manufacturer."""
         return f"""
             [table]
             counts_per_deg = {self.counts_per_deg}
@@ -93,7 +93,7 @@ class Move:
 
 
 class IdealTable(Stand):
-    """The registers and the commands; also what can be done to it beside the wire."""
+    """The registers and the commands; also the actions of the bench."""
 
     capabilities = frozenset({TRIGGER, POWER_CYCLE, PRESET})
 
@@ -118,7 +118,7 @@ class IdealTable(Stand):
         return (round(self.move.at(time_s)[0] * self.make.counts_per_deg) + 2**31) % 2**32 - 2**31
 
     def reply_to(self, line: bytes, time_s: float) -> str | int:
-        """Carry out a line at a time; return its reply, or the number of its refusal."""
+        """Execute a line at a time; return its reply, or the number of its error."""
         if line[:1] not in {b"H", b"L", b"P", b"R", b"S", b"A"}:
             return 1
         found = _COMMAND.fullmatch(line)
@@ -159,7 +159,7 @@ class IdealTable(Stand):
 
 @dataclass
 class SimulatedClock:
-    """Time that passes only when somebody waits."""
+    """Time that passes only while a program waits."""
 
     time_s: float = 0.0
 

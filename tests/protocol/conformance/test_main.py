@@ -1,4 +1,4 @@
-"""The command line: records, reports, replays, exit statuses, and one clear line for what cannot be."""
+"""The command line: records, reports, replays, exit statuses, and one clear line for each error."""
 
 import itertools
 import json
@@ -138,7 +138,7 @@ def test_a_file_that_cannot_be_written_takes_none_of_the_others_with_it(
     assert conformance("--port", "emulator://", "--case", "5.2/1$", "--out", out) == 2
     said = capsys.readouterr()
     assert said.out == "1 pass\n"
-    assert said.err == f"conformance: {out / 'record.json'}: cannot be written: Is a directory\n"
+    assert said.err == f"conformance: {out / 'record.json'}: cannot write: Is a directory\n"
     assert sorted(path.name for path in out.iterdir()) == ["junit.xml", "record.json", "report.html"]
 
 
@@ -148,7 +148,7 @@ def test_a_reader_of_stdout_that_goes_away_costs_nothing_but_what_it_would_have_
     words = [sys.executable, "-m", "protocol.conformance", "--port", "emulator://", "--case", "5", "--out", str(out)]
     result = subprocess.run(words, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writer)
-    assert (result.returncode, result.stderr) == (0, f"conformance: the report is {out / 'report.html'}\n")
+    assert (result.returncode, result.stderr) == (0, f"conformance: report: {out / 'report.html'}\n")
     assert json.loads((out / "record.json").read_text())["verdicts"]["skipped"] == 2
 
 
@@ -156,8 +156,8 @@ def test_a_reader_of_stdout_that_goes_away_costs_nothing_but_what_it_would_have_
     ("words", "closed", "status", "said"),
     [
         ("--port emulator:// --case 5.4 --out out", "2>&-", 0, "2 skipped\n"),
-        ("--port emulator:// --case 5.4 --out out", ">&-", 0, "conformance: the report is out/report.html\n"),
-        ("--port loop:// --case 5.4 --out out", "<&- >&-", 2, "deg/s2; say --yes if it may\n"),
+        ("--port emulator:// --case 5.4 --out out", ">&-", 0, "conformance: report: out/report.html\n"),
+        ("--port loop:// --case 5.4 --out out", "<&- >&-", 2, "deg/s2; add --yes to allow this\n"),
     ],
 )
 def test_a_stream_that_is_closed_from_the_start_is_done_without(
@@ -184,13 +184,19 @@ def test_the_list_shows_clauses_and_needs(capsys: pytest.CaptureFixture[str]) ->
     ("words", "sentence"),
     [
         (["--port", "emulator://"], "give --port URL and --out DIR"),
-        (["--port", "emulator://", "--out", "OUT", "--case", "12"], "--case: no case begins with 12"),
-        (["--port", "emulator://", "--out", "OUT", "--case", ""], "--case: a prefix is empty; leave the option out"),
+        (["--port", "emulator://", "--out", "OUT", "--case", "12"], "--case: no case id starts with 12"),
+        (["--port", "emulator://", "--out", "OUT", "--case", ""], "--case: a prefix is empty; omit the option"),
         (["--port", "emulator://", "--out", "OUT", "--junit", "/"], "--junit /: is a directory; name a file"),
-        (["--port", "emulator://", "--out", "/x", "--junit", "/x/record.json"], "goes to another file of --out; name"),
+        (
+            ["--port", "emulator://", "--out", "/x", "--junit", "/x/record.json"],
+            "is another output file of --out; choose",
+        ),
         (["--port", "/dev/no-such-table", "--out", "OUT"], "cannot open /dev/no-such-table"),
-        (["--port", "loop://", "--out", "OUT", "--yes"], "loop://: 'H' got b'H\\r', which is no position; this is no"),
-        (["--port", "loop://", "--out", "OUT"], "deg/s2; say --yes if it may"),
+        (
+            ["--port", "loop://", "--out", "OUT", "--yes"],
+            "loop://: 'H' got b'H\\r', which is not a position; this is not",
+        ),
+        (["--port", "loop://", "--out", "OUT"], "deg/s2; add --yes to allow this"),
         (["--port", "emulator://", "--out", "OUT", "--profile", "none.toml"], "none.toml: cannot be read"),
         (["--port", "emulator://", "--out", "OUT", "--control", "none"], "none: "),
         (["--port", "emulator://", "--replay", "none.json"], "none.json: cannot be read"),
@@ -244,15 +250,21 @@ def test_a_record_sent_to_another_table_shows_where_the_answers_part(
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"version": 2}, "is of version 2; this program reads version 1"),
-        ({"format": "a shopping list"}, "is no seventh-axis conformance record"),
+        ({"version": 2}, "has version 2; this program reads version 1"),
+        ({"format": "a shopping list"}, "is not a seventh-axis conformance record"),
         ({"cases": [{}]}, "is damaged: KeyError 'id'"),
-        ({"version": "1"}, "is of version '1'; this program reads version 1"),
-        ({"cases": []}, "holds no wire of these cases; nothing can be sent"),
-        ({"cases": [{"id": "0.0/0", "wire": [[0, "sent", "H\r"]]}]}, "holds no wire of these cases"),
-        ({"cases": [{"id": "4.5/4", "wire": [["soon", "sent", "H\r"]]}]}, "is damaged: ValueError 'soon' is no time"),
-        ({"cases": [{"id": "4.5/4", "wire": [[0, "shouted", "H\r"]]}]}, "'shouted' is none of sent, received, beside"),
-        ({"cases": [{"id": "4.5/4", "wire": [[0, "beside", "kick"]]}]}, "'kick' is nothing that is done beside the"),
+        ({"version": "1"}, "has version '1'; this program reads version 1"),
+        ({"cases": []}, "contains no traffic of these cases; choose other cases"),
+        ({"cases": [{"id": "0.0/0", "wire": [[0, "sent", "H\r"]]}]}, "contains no traffic of these cases"),
+        (
+            {"cases": [{"id": "4.5/4", "wire": [["soon", "sent", "H\r"]]}]},
+            "is damaged: ValueError 'soon' is not a time",
+        ),
+        (
+            {"cases": [{"id": "4.5/4", "wire": [[0, "shouted", "H\r"]]}]},
+            "'shouted' is not one of sent, received, beside",
+        ),
+        ({"cases": [{"id": "4.5/4", "wire": [[0, "beside", "kick"]]}]}, "'kick' is not an action of the rig"),
         ({"cases": [{"id": "4.5/4", "wire": [[10**400, "sent", "H\r"]]}]}, "is damaged: OverflowError"),
         ({"home_deg": 10**400}, "is damaged: OverflowError"),
         ({"home_deg": float("inf")}, "Infinity is not a number"),
@@ -278,7 +290,7 @@ def test_a_record_of_a_livelier_table_is_not_sent(
 
 
 def hostile(record: Path, *lines: str) -> None:
-    """Let a record claim the mildest profile, and hide other lines in its first case."""
+    """Let a record contain the mildest profile, and hide other lines in its first case."""
     changed = json.loads(record.read_text())
     changed["profile"]["motion"] = {"reach_deg": 1.0, "speed_deg_s": 1.0, "acceleration_deg_s2": 1.0}
     case = next(case for case in changed["cases"] if case["wire"])
@@ -320,7 +332,7 @@ def test_a_record_that_hides_a_motion_is_refused_before_anything_is_sent(
 def test_a_replay_ends_when_a_table_has_carried_out_what_it_must_refuse(
     record: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A table that knows small letters is moved by a line that fits, and the next case would begin elsewhere."""
+    """A table that accepts lowercase letters is moved by a line that fits, and the next case would start elsewhere."""
     changed = json.loads(record.read_text())
     names = [case["id"] for case in changed["cases"] if case["wire"]][:2]
     changed["cases"] = [

@@ -1,6 +1,6 @@
-"""Each case is shown to fail: it catches by name a table that is wrong in the way that the case is there for.
+"""Each case is shown to fail: it detects the wrong table that belongs to it, by name.
 
-That a right table passes them all is shown in `test_suite`.
+`test_suite` shows that a correct table passes all cases.
 """
 
 import dataclasses
@@ -23,7 +23,7 @@ CATCHES_NONE = {
 
 
 def outcome_of(kind: type[Mutant], identifier: str) -> Outcome:
-    """Run one case against a table of a kind, which is a strict one where the case needs that."""
+    """Run one case against a kind of table, in strict mode if the case needs that."""
     (case,) = chosen_cases([f"{identifier}$"])
     strict = STRICT in case.needs
     profile = load_profile()
@@ -48,5 +48,5 @@ def test_each_case_catches_a_wrong_table() -> None:
 
 def test_with_a_table_at_another_rate_no_session_begins() -> None:
     port = port_to(Mutant, load_config().with_serial(baud=19200))
-    with pytest.raises(SessionError, match="is the table on, the cable right, and its rate 9600 baud"):
+    with pytest.raises(SessionError, match=r"check the power of the table, the cable, and the baud rate \(here 9600\)"):
         Session(RecordedPort(port), load_profile(), InProcess(port.table))

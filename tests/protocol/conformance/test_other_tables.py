@@ -1,4 +1,4 @@
-"""Tables of another make: the kit passes what is right, however unusual it is, and says what it cannot test."""
+"""Third-party tables: the kit passes unusual but conforming ones, and states what it cannot test."""
 
 import dataclasses
 from pathlib import Path
@@ -70,7 +70,7 @@ def test_what_such_a_table_lacks_is_said(tmp_path: Path) -> None:
         "a way to switch the table off and on not available",
         "a way to preset the position counter not available",
         "a view of the encoder beside the wire not available",
-        "a table that sees its client go not available",
+        "a table that detects when its client disconnects not available",
         "error replies not available",
     }
 

@@ -20,7 +20,7 @@ COMMAND = [sys.executable, "-m", "protocol.conformance", "--yes"]
 pytestmark = pytest.mark.realtime
 
 
-class StandIn:
+class EmulatorProcess:
     """A running emulator, its port and its control channel."""
 
     def __init__(self, process: "subprocess.Popen[str]", control: Path) -> None:
@@ -30,19 +30,27 @@ class StandIn:
 
 
 @pytest.fixture(params=[("--pty",), ("--tcp", "0"), ("--rfc2217", "0")], ids=["pty", "tcp", "rfc2217"])
-def stand_in(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[StandIn]:
+def start_emulator(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[EmulatorProcess]:
     control = tmp_path / "control"
     command = [sys.executable, "-m", "emulator", *request.param, "--control", str(control)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         try:
-            yield StandIn(process, control)
+            yield EmulatorProcess(process, control)
         finally:
             process.terminate()
 
 
-def test_the_stand_in_conforms_in_real_time(stand_in: StandIn, tmp_path: Path) -> None:
+def test_the_emulator_conforms_in_real_time(start_emulator: EmulatorProcess, tmp_path: Path) -> None:
     cases = [word for case in SHORT for word in ("--case", case)]
-    words = ["--port", stand_in.port, "--control", str(stand_in.control), *cases, "--out", str(tmp_path / "out")]
+    words = [
+        "--port",
+        start_emulator.port,
+        "--control",
+        str(start_emulator.control),
+        *cases,
+        "--out",
+        str(tmp_path / "out"),
+    ]
     result = subprocess.run([*COMMAND, *words], capture_output=True, text=True, check=False, timeout=120)
     assert result.returncode == 0, result.stdout + result.stderr
     record = json.loads((tmp_path / "out" / "record.json").read_text())
@@ -52,41 +60,41 @@ def test_the_stand_in_conforms_in_real_time(stand_in: StandIn, tmp_path: Path) -
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_and_a_polite_kill_stop_the_table_and_leave_the_record(
-    number: signal.Signals, stand_in: StandIn, tmp_path: Path
+    number: signal.Signals, start_emulator: EmulatorProcess, tmp_path: Path
 ) -> None:
     words = [
         "--port",
-        stand_in.port,
+        start_emulator.port,
         "--control",
-        str(stand_in.control),
+        str(start_emulator.control),
         "--case",
         "4.2/3",
         "--out",
         str(tmp_path / "out"),
     ]
     with subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        wait_for_motion(stand_in.control)
+        wait_for_motion(start_emulator.control)
         process.send_signal(number)
         _, said = process.communicate(timeout=60)
     assert process.returncode == 128 + number
     assert "interrupted after 0 of 1 cases; the table was stopped" in said
-    state = state_of(stand_in.control)
+    state = state_of(start_emulator.control)
     assert state["state"] == "idle"
     assert 1.0 < float(str(state["encoder_deg"])) < 369.0  # where it was, neither at home nor at its target
     assert (tmp_path / "out" / "record.json").exists()
 
 
-def test_a_polite_kill_of_pytest_stops_the_table_too(stand_in: StandIn, tmp_path: Path) -> None:
+def test_a_polite_kill_of_pytest_stops_the_table_too(start_emulator: EmulatorProcess, tmp_path: Path) -> None:
     plugin = ["-p", "no:cacheprovider", "-p", "seventh_axis.pytest_plugin"]
-    table = ["--table-port", stand_in.port, "--table-control", str(stand_in.control), "--table-yes"]
+    table = ["--table-port", start_emulator.port, "--table-control", str(start_emulator.control), "--table-yes"]
     command = [sys.executable, "-m", "pytest", *plugin, "--pyargs", "protocol.conformance", *table, "-k", "4.2/3"]
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
     with subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE) as process:
-        wait_for_motion(stand_in.control)
+        wait_for_motion(start_emulator.control)
         process.send_signal(signal.SIGTERM)
         process.communicate(timeout=60)
     assert process.returncode == pytest.ExitCode.INTERRUPTED
-    state = state_of(stand_in.control)
+    state = state_of(start_emulator.control)
     assert state["state"] == "idle"
     assert 1.0 < float(str(state["encoder_deg"])) < 369.0
 

@@ -1,4 +1,4 @@
-"""A session on a machine that is late: what it spoiled is run again, and no table is failed for it."""
+"""A session on a machine with delays: affected cases are run again, and no table fails because of them."""
 
 import dataclasses
 
@@ -20,7 +20,7 @@ from tests.protocol.conformance.mutants import MUTANTS, Mutant, port_to
 
 
 class BusyMachine:
-    """A machine that is late in the first runs of a case and punctual from then on."""
+    """A machine that is late in the first runs of a case and not late from then on."""
 
     def __init__(self, late_runs: int) -> None:
         self._runs_left = late_runs + 1  # the session's first question is one
@@ -41,7 +41,7 @@ class BusyMachine:
 
 
 def failing_at_first(failures: int) -> Case:
-    """A case that asks a true table something wrong so often, and is content after that."""
+    """A case that fails a correct table a given number of times, and then passes it."""
     left = [failures]
 
     def run(rig: Rig) -> None:
@@ -118,7 +118,7 @@ def test_a_late_reading_tells_nothing_about_speed_and_acceleration(identifier: s
 
 
 class BusyWhileTheTableTurns(BusyMachine):
-    """A machine that is calm when the table has come to rest."""
+    """A machine without delays once the table is at rest."""
 
     def __init__(self, port: Serial) -> None:
         super().__init__(late_runs=0)

@@ -6,9 +6,9 @@ import pytest
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.dijkstra import shortest_path
-from planner.planning.lattice_choice import turn_lattice
-from planner.planning.plan import Plan, make_plan
-from planner.planning.problem import Problem
+from planner.plans.plan import Plan, make_plan
+from planner.plans.problem import Problem
+from planner.search.lattice_choice import turn_lattice
 from planner.table.motion import Limits, roll_out
 from tools.bench.default_planner import can_be_executed, lattice_optimum, measure
 from tools.bench.planner import median_seconds

@@ -1,4 +1,4 @@
-"""A small share of the stops that the benchmark makes, as tests."""
+"""A small share of the benchmark's stops, as tests."""
 
 from tools.bench.stop import stops_along
 from tools.bench.virtual_run import random_run_inputs, shipped_run_input

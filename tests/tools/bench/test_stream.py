@@ -1,4 +1,4 @@
-"""A small share of what the benchmark measures, as tests."""
+"""A small share of the benchmark's measurements, as tests."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,7 +9,7 @@ from planner.arrays import FloatArray
 from planner.execution.execute import Settings
 from planner.execution.stream import TimedCommand, reference_states, rounded_stream, stream
 from planner.execution.table_motion import TableMotion
-from planner.planning.plan import Plan
+from planner.plans.plan import Plan
 from planner.table.motion import Limits
 from planner.table.wire import Wire
 from tools.bench.stream import LEAD_S, random_plan
@@ -17,7 +17,7 @@ from tools.bench.virtual_run import random_run_inputs, run_in_virtual_time
 
 
 def errors_at_locations(plan: Plan, limits: Limits, streamed: Callable[..., Sequence[TimedCommand]]) -> FloatArray:
-    """Return how far the reference is from a plan at each location, by the controller's own rules."""
+    """Return the deviation of the reference from a plan at each location, by the controller's rules."""
     motion = TableMotion(plan, limits)
     states = reference_states(streamed(motion, limits, Wire()), motion.column_times_s)
     return np.array([state.angle_deg for state in states]) - plan.angles_deg

@@ -8,6 +8,7 @@ import emulator  # noqa: F401  # teaches pyserial the port emulator://
 from emulator.config.table_config import TableConfig, load_config
 from emulator.protocol_emulator import Serial
 from protocol.client import TableClient
+from tests.tools.identification.late_port import LatePort
 from tools.identification.excitation import excitation
 from tools.identification.recorder import record
 from tools.identification.recording import WireRecording
@@ -26,7 +27,7 @@ backlash_arcmin = 21.0
 
 @pytest.fixture(scope="session")
 def unseen(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The file of a table that no fit begins from."""
+    """The file of a table that is not the start of any fit."""
     path = tmp_path_factory.mktemp("unseen") / "table.toml"
     path.write_text(UNSEEN, encoding="utf-8")
     return path
@@ -41,40 +42,24 @@ def recording(unseen: Path) -> WireRecording:
 
 @pytest.fixture(scope="session")
 def assumed() -> TableConfig:
-    """What is known of it beforehand: the default table, and that is wrong by much."""
+    """The known constants: those of the default table, some of which are far from the true ones."""
     return load_config()
 
 
-class UnhurriedPort:
-    """A port of a busy computer: what is written leaves late now and then, and what comes in is handed over late."""
+class UnhurriedPort(LatePort):
+    """A port of a busy computer: written bytes are sometimes late, and so are received bytes."""
 
     def __init__(self, port: Serial, seed: int) -> None:
-        self._port = port
-        self._chance = Random(seed)  # noqa: S311  # jitter is no secret
-        self.clock = port.clock
-        self.timeout: float | None = 1.0
-
-    @property
-    def in_waiting(self) -> int:
-        return self._port.in_waiting
-
-    def read(self, size: int, /) -> bytes:
-        self._port.timeout = self.timeout
-        data = self._port.read(size)
-        if data.endswith(b"\r"):
-            self._dawdle()
-        return data
+        super().__init__(port)
+        self._chance = Random(seed)  # noqa: S311  # not for security
 
     def write(self, data: bytes, /) -> int | None:
-        self._dawdle()
-        return self._port.write(data)
+        self.dawdle()
+        return super().write(data)
 
-    def close(self) -> None:
-        self._port.close()
-
-    def _dawdle(self) -> None:
+    def dawdle(self) -> None:
         if self._chance.random() < 0.04:
-            self._port.advance(1 + int(self._chance.expovariate(0.3)))
+            self.port.advance(1 + int(self._chance.expovariate(0.3)))
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ def swing(vector: Array) -> Array:
 
 
 def two_sided(vector: Array) -> Array:
-    """The same width with either sign of the rate, but for a small term that only one of them has."""
+    """The same width with either sign of the rate, except for a small term that only one of them has."""
     width, rate, offset = vector
     result: Array = swing(np.array([width, abs(rate), offset])) + 0.004 * max(rate, 0.0) * np.cos(7.0 * _TIME)
     return result
@@ -104,4 +104,4 @@ def test_a_search_that_leaves_a_little_unexplained_is_repeated() -> None:
 
     once = simulations(0.0)
     assert simulations(0.004) > 1.7 * once
-    assert simulations(0.2) < 1.3 * once  # not a good recording: no search helps
+    assert simulations(0.2) < 1.3 * once  # a faulty recording: no search helps

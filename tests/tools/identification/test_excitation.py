@@ -15,7 +15,7 @@ def test_the_firmware_runs_a_burst_as_predicted_whenever_in_the_braking_the_targ
     index: int, assumed: TableConfig
 ) -> None:
     burst = excitation(60.0, 40.0, 100.0, seed=0)[index]
-    chance = Random(index)  # noqa: S311  # jitter is no secret
+    chance = Random(index)  # noqa: S311  # not for security
 
     answer = emulate(assumed, motions(burst, chance), burst.duration_s)
 
@@ -25,7 +25,7 @@ def test_the_firmware_runs_a_burst_as_predicted_whenever_in_the_braking_the_targ
 
 
 def motions(burst: Burst, chance: Random) -> list[Motion]:
-    """Return the commands of a burst; all but the first come early or late by up to 40 ms."""
+    """Return the commands of a burst; all except the first are early or late by up to 40 ms."""
     return [
         Motion(
             move.send_s + (chance.uniform(-0.04, 0.04) if move.send_s else 0.0),

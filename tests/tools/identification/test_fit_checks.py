@@ -15,7 +15,7 @@ _TIME_S = np.linspace(0.0, 60.0, 4000)
 
 
 def half(**factors: float) -> Half:
-    """What a half gives that sees some constants by a factor greater, each known to 2 %."""
+    """The result of one half with some constants larger by a factor, each known to 2 %."""
     vector = np.array([parameter.log_of(load_config()) for parameter in PARAMETERS])
     for index, parameter in enumerate(PARAMETERS):
         vector[index] += np.log(factors.get(parameter.key, 1.0))

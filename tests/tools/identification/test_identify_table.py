@@ -57,7 +57,7 @@ def test_so_does_a_minute_that_a_busy_computer_recorded(
 
 
 def drive_recording(truth: TableConfig, reversals: int) -> DriveRecording:
-    """Duty and encoder of a table that turns to and fro, fast and slowly."""
+    """Duty and encoder of a table that turns back and forth, fast and slowly."""
     speeds = (40.0, 2.0, 20.0, 5.0)
     motions = [
         Motion(0.1 + 0.6 * turn, 1000.0 * (-1.0) ** turn, speeds[turn // 4 % len(speeds)], 100.0)

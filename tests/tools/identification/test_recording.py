@@ -165,7 +165,7 @@ def test_a_file_that_is_not_understood_is_refused_by_its_own_name(data: bytes, c
     ("text", "complaint"),
     [
         ("", "has the columns \\(none\\)"),
-        ("time_s,angle\n0,1\n", "has the columns time_s, angle; needed are"),
+        ("time_s,angle\n0,1\n", "has the columns time_s, angle; required are"),
         ("time_s,command,position_deg\n0,H,twelve\n", "line 2: position_deg is 'twelve'; it must be a number"),
         ("time_s,command,position_deg\n0,X,1\n", "line 2: the command is 'X'"),
         ("time_s,command,position_deg\n0,P,\n", "line 2: command is ''; it must be a number"),

@@ -22,7 +22,7 @@ def kept(recording: WireRecording, which: NDArray[np.bool_]) -> WireRecording:
 
 
 def later(recording: WireRecording, shift_s: Array) -> WireRecording:
-    """Shift the recorder's clock: at each time of a reading by so much, and with it the commands'."""
+    """Shift the recorder's clock by a given time at each reading, including the commands."""
 
     def shifted(sent: Sent) -> Sent:
         by_s = float(np.interp(sent.time_s, recording.time_s, shift_s))
@@ -53,7 +53,7 @@ def with_the_clock_set_forward(recording: WireRecording) -> WireRecording:
 
 def with_a_timer_of(period_s: float) -> Spoil:
     def spoil(recording: WireRecording) -> WireRecording:
-        """Hand all over at the next tick of an adapter, and ask no sooner."""
+        """Deliver everything at the next tick of an adapter, and send nothing earlier."""
 
         def gathered(time_s: Array) -> Array:
             return np.ceil(time_s / period_s) * period_s
@@ -119,15 +119,15 @@ def test_a_good_recording_passes(assumed: TableConfig, recording: WireRecording)
 @pytest.mark.parametrize(
     ("spoil", "complaint"),
     [
-        (too_short, r"500 readings in .* s; needed are"),
+        (too_short, r"500 readings in .* s; required are"),
         (with_a_gap, r"a gap of 1\.\d\d s at (19\.9|20\.0)"),
         (with_the_clock_set_back, r"the clock steps back by 0\.2\d* s at (19\.9|20\.0)"),
         (with_the_clock_set_forward, r"clock jumps or runs unevenly \(ticks [23]\d{4} to 3\d{4}\)"),
         (with_a_timer_of(0.002), "on a grid of 2 ticks"),
         (with_a_timer_of(0.016), "on a grid of 16 ticks"),
         (with_replies_that_an_adapter_gathers, "do not come at the table's ticks"),
-        (in_radians, r"moves over [0-9.]+ deg only|not where its commands send it"),
-        (in_milliseconds, "are its times in seconds"),
+        (in_radians, r"moves over [0-9.]+ deg only|not at the position of its commands"),
+        (in_milliseconds, "check that its times are in seconds"),
         (in_counts, "the wrong units"),
         (stalled, "a stall"),
         (without_motion, "moves over 0 deg only"),

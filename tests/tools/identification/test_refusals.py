@@ -1,4 +1,4 @@
-"""Recordings that must not be believed, through the command line."""
+"""Recordings that must be refused, from the command line."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,6 +12,7 @@ import serial
 from emulator.config.table_config import TableConfig
 from emulator.protocol_emulator import Serial
 from protocol.client import TableClient
+from tests.tools.identification.late_port import LatePort
 from tools.emulated import Array
 from tools.identification.errors import RecordingError
 from tools.identification.excitation import excitation
@@ -70,7 +71,7 @@ def without_a_move(recording: WireRecording) -> WireRecording:
         (lambda recording: on_clock(recording, gathered(0.016), lines_too=False), "on a grid of 16 ticks"),
         (lambda recording: on_clock(recording, gathered(0.002), lines_too=False), "on a grid of 2 ticks"),
         (doubled, "readings are doubled"),
-        (without_a_move, "moves though no command sends it: a P or R command is missing"),
+        (without_a_move, "moves without a command: a P or R command is missing"),
         # An integer number of ticks leaves no trace in the replies' phase: the fit must find it.
         (lambda recording: on_clock(recording, jumping(0.02, 32.0)), "the model does not explain the recording"),
     ],
@@ -93,32 +94,16 @@ def test_a_spoiled_recording_is_refused_with_its_reason(
     assert list(tmp_path.iterdir()) == [trace]
 
 
-class GatheringPort:
-    """An adapter in virtual time that hands over what came in every 16 ms."""
+class GatheringPort(LatePort):
+    """An adapter in virtual time that delivers received bytes every 16 ms."""
 
     def __init__(self, port: Serial, ticks: int) -> None:
-        self._port = port
+        super().__init__(port)
         self._ticks = ticks
-        self.clock = port.clock
-        self.timeout: float | None = 1.0
 
-    @property
-    def in_waiting(self) -> int:
-        return self._port.in_waiting
-
-    def read(self, size: int, /) -> bytes:
-        self._port.timeout = self.timeout
-        data = self._port.read(size)
-        if data.endswith(b"\r"):
-            tick = round(1000.0 * self.clock.now_s())
-            self._port.advance(ceil(tick / self._ticks) * self._ticks - tick)
-        return data
-
-    def write(self, data: bytes, /) -> int | None:
-        return self._port.write(data)
-
-    def close(self) -> None:
-        self._port.close()
+    def dawdle(self) -> None:
+        tick = round(1000.0 * self.clock.now_s())
+        self.port.advance(ceil(tick / self._ticks) * self._ticks - tick)
 
 
 def test_recording_over_an_adapter_that_gathers_bytes_ends_after_the_first_burst(assumed: TableConfig) -> None:

@@ -13,7 +13,7 @@ def exact_timing(assumed: TableConfig, recording: WireRecording) -> Timing:
 
 
 def assert_same_but_for_the_origin(told: Timing, readings: Array, commands: Array) -> None:
-    """Compare ticks; one shift of them all is no matter, as only what lies between them counts."""
+    """Compare ticks; a common shift of all of them does not matter, because only differences count."""
     shift = told.readings[0] - readings[0]
     np.testing.assert_array_equal(told.readings, readings + shift)
     np.testing.assert_array_equal(told.commands, commands + shift)

@@ -1,4 +1,4 @@
-"""The command `seventh-axis`: it leads to the same programs as `python -m ...`, from any folder."""
+"""The command `seventh-axis`: it starts the same programs as `python -m ...`, from any folder."""
 
 import os
 import subprocess
@@ -67,7 +67,7 @@ def test_what_is_no_command_is_one_line_and_status_2(words: list[str], said: str
 
 
 def completed(line: str, folder: Path) -> set[str]:
-    """Return what the shell is offered to complete a line by."""
+    """Return the completions of a line for the shell."""
     offered = folder / "offered"
     offered.touch()
     shell = {"_ARGCOMPLETE": "1", "COMP_LINE": line, "COMP_POINT": str(len(line)), "_ARGCOMPLETE_IFS": "\n"}
@@ -77,7 +77,7 @@ def completed(line: str, folder: Path) -> set[str]:
 
 
 def test_commands_and_their_options_are_completed(tmp_path: Path) -> None:
-    assert completed("seventh-axis t", tmp_path) == {"table", "tune", "trace"}
+    assert completed("seventh-axis t", tmp_path) == {"table", "tune", "trace", "track"}
     assert completed("seventh-axis table --t", tmp_path) == {"--tcp", "--time-scale", "--trigger-hz", "--trace"}
     assert completed("seventh-axis plan cylinder --sm", tmp_path) == {"--smooth"}
     assert completed("seventh-axis control ./socket fault-h", tmp_path) == {"fault-half-reply", "fault-hang-up"}

@@ -1,4 +1,4 @@
-"""Projects whose own packages are named as ours: they run their tests, and the fixture says what it cannot do."""
+"""Projects with packages of the same names: they run their tests, and the fixture states what it cannot do."""
 
 import os
 import subprocess
@@ -28,7 +28,7 @@ AS_A_MODULE = [sys.executable, "-m", "pytest"]
 def run_pytest(
     folder: Path, *words: str, start: list[str] = PYTEST, path: str = ""
 ) -> subprocess.CompletedProcess[str]:
-    """Run pytest as the project would: the plug-in is found by its entry point."""
+    """Run pytest like the project: the plug-in is found by its entry point."""
     command = [*start, "-q", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", *words]
     environment = os.environ | {"PYTHONPATH": path}
     return subprocess.run(

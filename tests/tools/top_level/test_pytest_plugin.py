@@ -1,4 +1,4 @@
-"""The fixture and the suite as other people's projects use them."""
+"""The fixture and the suite in other projects."""
 
 import os
 import shlex
@@ -98,7 +98,7 @@ def test_the_suite_runs_under_pytest(tmp_path: Path) -> None:
 
 
 @pytest.mark.realtime
-def test_the_suite_starts_a_pty_stand_in_under_pytest(tmp_path: Path) -> None:
+def test_the_suite_starts_a_pty_emulator_under_pytest(tmp_path: Path) -> None:
     result = run_pytest(tmp_path, "--pyargs", "protocol.conformance", "--table-port", "pty", "-k", "5.3 or 6.2/2")
     assert "7 passed" in result.stdout, result.stdout + result.stderr
 
@@ -117,7 +117,7 @@ def test_a_failure_under_pytest_ends_with_the_command_that_repeats_it_alone(tmp_
 
 @pytest.fixture
 def hang_up() -> Iterator[str]:
-    """A TCP server that hangs up on everybody."""
+    """A TCP server that disconnects every client."""
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def serve() -> None:
@@ -135,7 +135,7 @@ def hang_up() -> Iterator[str]:
 @pytest.mark.parametrize(
     ("port", "sentence"),
     [
-        ("loop://", "each way from where it stands, at up to 40 deg/s and 100 deg/s2; say --table-yes if it may"),
+        ("loop://", "each way from where it stands, at up to 40 deg/s and 100 deg/s2; add --table-yes to allow this"),
         ("/dev/none", "cannot open /dev/none"),
     ],
 )

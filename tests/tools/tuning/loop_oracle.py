@@ -1,4 +1,6 @@
-"""The speed loop from its differential equations, without the product's model: plain numpy, in the frequency domain.
+"""The speed loop from its differential equations, independent of the product's model.
+
+It uses plain numpy, in the frequency domain.
 
 The spectrum of a sampled signal is the sum of the continuous one over its aliases. With the zero-order hold in front,
 

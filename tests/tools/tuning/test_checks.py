@@ -32,7 +32,7 @@ def test_the_load_on_the_default_table_is_the_one_of_its_linear_design() -> None
 
 @pytest.mark.parametrize("share", [0.1, 2.0])
 def test_a_table_with_other_gears_is_checked_within_its_own_speeds_and_loads(share: float) -> None:
-    """Geared down or up, the same motor under the same loop makes the same motion, on another scale at the table."""
+    """With another gear ratio, the same motor with the same load makes the same motion, scaled at the table."""
     ramp, hold = (
         replace(gains, proportional_duty_s_deg=gains.proportional_duty_s_deg / share)
         for gains in (CONFIG.gains.ramp, CONFIG.gains.hold)

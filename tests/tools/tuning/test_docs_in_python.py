@@ -1,4 +1,4 @@
-"""The examples of docs/tuning.md, "In Python": run, and held against a loop that is computed from scratch."""
+"""The examples of docs/tuning.md, "In Python": run, and compared with a loop that is computed from scratch."""
 
 import doctest
 import re

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from emulator.config.table_config import load_config
-from tools.tuning.bounds import Bound, Limits, violation
+from tools.bounds import Bound, Limits, violation
 from tools.tuning.gain_design import LEAST_LAG, LEAST_LOAD_PEAK, Objective, design, scan
 from tools.tuning.loop_figures import Loops, loop_figures
 from tools.tuning.monte_carlo import monte_carlo, spread_tables

@@ -48,7 +48,7 @@ def test_gains_that_the_configuration_cannot_state_are_misuse() -> None:
 
 @pytest.mark.skipif(not shutil.which("gcc"), reason="there is no gcc to compile the header with")
 def test_the_header_compiles_without_a_warning_and_holds_the_registers(tmp_path: Path) -> None:
-    """As on a small controller: long is what holds 32 bits there, so each gain must be one and fit an int32_t."""
+    """As on a small controller, `long` has 32 bits: each gain must be one and fit an int32_t."""
     (tmp_path / "gains.h").write_text(gains_header(OTHER, SETS | {"widest": WIDEST}), encoding="ascii")
     names = [
         f"GAINS_{name}_{key}"

@@ -26,7 +26,7 @@ def frictionless(backlash_arcmin: float) -> TableConfig:
 
 
 def emulated_answer(config: TableConfig, reference_deg_s: Array, load_Nm: Array) -> Array:
-    """Close the firmware's loop, in real numbers, about the emulator's plant; return the speed after each tick."""
+    """Close the firmware's loop, in real numbers, around the emulator's plant; return the speed after each tick."""
     train = drive_constants(config)
     state = drive_train.at_standstill(train, 0.0)
     proportional, integral, derivative = duty_gains(config, fixed_gains(config, config.gains.hold))

@@ -1,7 +1,7 @@
-"""The figures of a gain set against a second way that shares no code with them.
+"""The figures of a gain set compared with a second computation that shares no code with them.
 
-The plant is discretized by scipy from the constants of the configuration, the loop's response is walked along a dense
-line of frequencies, and the answers in time come from iterating the closed loop's states tick by tick.
+scipy discretizes the plant from the constants of the configuration. The loop's response is computed along a dense line
+of frequencies. The responses over time come from iterating the closed loop's states tick by tick.
 """
 
 from dataclasses import replace

@@ -90,7 +90,7 @@ def test_a_loop_is_called_stable_when_all_its_poles_are_within_the_unit_circle(t
 
 
 def test_the_noise_at_the_pwm_is_that_of_the_answers_to_each_count() -> None:
-    """The other way round: the variance is the sum over the squared answer to one count, tick by tick."""
+    """In the opposite direction: the variance is the sum over the squared response to one count, tick by tick."""
     gains, z = fixed_gains(CONFIG, CONFIG.gains.ramp), grid_z()
     count_deg, _ = quantization_noise(CONFIG)
     window = CONFIG.control.speed_window_ticks

@@ -1,4 +1,4 @@
-"""The noise at a constant speed, against the rounding of a position tick by tick."""
+"""The noise at a constant speed, compared with the rounding of a position tick by tick."""
 
 from dataclasses import replace
 

@@ -4,16 +4,16 @@ from itertools import pairwise
 import pytest
 
 from emulator.config.table_config import load_config
-from tools.tuning.bounds import Limits
+from tools.bounds import Limits
 from tools.tuning.checks import Difference
 from tools.tuning.tune_plots import plots
 from tools.tuning.tune_report import tune_report
-from tools.tuning.tuned_table import Tuning, tune
+from tools.tuning.tuned_table import Terms, Tuning, tune
 
 
 @pytest.fixture(scope="module")
 def tuning() -> Tuning:
-    return tune(load_config(), Limits(), plants=8, spread=0.2, seed=0)
+    return tune(load_config(), Terms(Limits(), plants=8, spread=0.2, seed=0))
 
 
 def cells(html: str, first: str) -> list[str]:

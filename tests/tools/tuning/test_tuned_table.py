@@ -5,7 +5,7 @@ import pytest
 
 from emulator.config.table_config import GainsConfig, load_config
 from tests.tools.tuning import loop_oracle
-from tools.tuning.bounds import Limits
+from tools.bounds import Limits
 from tools.tuning.gain_design import Design
 from tools.tuning.gain_files import gains_config
 from tools.tuning.linear_model import Teeth

@@ -1,4 +1,4 @@
-"""What is installed under a name of its own, so that it clashes with nobody's package: the command and the plug-in.
+"""The part that is installed under a unique name, so that it conflicts with no other package: command and plug-in.
 
 It imports none of the other packages until they are needed.
 """

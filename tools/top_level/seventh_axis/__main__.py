@@ -1,5 +1,5 @@
 # PYTHON_ARGCOMPLETE_OK
-"""The command `seventh-axis COMMAND ...`: one way to all programs, which `python -m ...` runs too."""
+"""The command `seventh-axis COMMAND ...`: one entry to all programs, which `python -m ...` runs too."""
 
 import os
 import sys
@@ -16,9 +16,9 @@ _BAD_INPUT = 2
 
 
 class Command(NamedTuple):
-    """One command: the module whose `main` runs it and whose `parser` reads its options.
+    """One command: the module with its `main` and its `parser`.
 
-    `by_name`: the module has several commands, and reads its name itself.
+    `by_name`: the module has several commands, and parses its name itself.
     """
 
     module: str
@@ -33,6 +33,7 @@ COMMANDS = {
     "map": Command("planner.__main__", "compute and draw a scan's configuration map", by_name=True),
     "plan": Command("planner.__main__", "plan the table's motion along a scan", by_name=True),
     "run": Command("planner.__main__", "carry out a plan on a table, and verify the motion", by_name=True),
+    "track": Command("planner.__main__", "plan the table while it moves, as locations become known", by_name=True),
     "scan": Command("planner.__main__", "scan a workpiece with a simulated probe", by_name=True),
     "show": Command("planner.__main__", "show a run as one HTML page", by_name=True),
     "conform": Command("protocol.conformance.__main__", "test a table against the specification"),
@@ -63,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _complete()
     if command is None:
         return _answer(words)
-    import protocol.quiet_start  # noqa: F401, PLC0415  # before the imports that take long
+    import protocol.quiet_start  # noqa: F401, PLC0415  # before the slow imports
     from protocol.command_line import COMMAND, run_as  # noqa: PLC0415  # see `seventh_axis`
 
     run_as(COMMAND if command.by_name else f"{COMMAND} {words[0]}")
@@ -71,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _answer(words: Sequence[str]) -> int:
-    """Answer what no command's module answers: `version`, `--version`, `--help`, and errors."""
+    """Handle the options without a module: `version`, `--version`, `--help`, and errors."""
     options = _parser().parse_args(words)
     if options.command == "version":
         sys.stdout.write(_versions())
@@ -115,7 +116,7 @@ def _version() -> str:
 
 
 def _complete() -> int:
-    """Print what the shell may complete the line by. No command is run, whatever the line says."""
+    """Print the possible completions for the shell. No command is run."""
     try:
         import argcomplete  # noqa: PLC0415  # an extra
     except ImportError:
@@ -126,7 +127,7 @@ def _complete() -> int:
     if command is None:
         argcomplete.autocomplete(_parser())
     else:
-        if not command.by_name:  # argcomplete is to begin one word later
+        if not command.by_name:  # argcomplete must start one word later
             os.environ["_ARGCOMPLETE"] = str(int(os.environ["_ARGCOMPLETE"]) + 1)
         argcomplete.autocomplete(import_module(command.module).parser())
     return _BAD_INPUT

@@ -1,4 +1,4 @@
-"""Where the packages of this project are installed, and which other package an import would find in their place."""
+"""Where the packages of this project are installed, and which other package would be imported instead."""
 
 import sys
 from importlib.machinery import ModuleSpec, PathFinder
@@ -6,11 +6,11 @@ from pathlib import Path
 
 _ABOVE = Path(__file__).resolve().parents
 HOME = next((folder for folder in _ABOVE[1:4] if (folder / "protocol" / "py.typed").is_file()), _ABOVE[1])
-"""The folder of the packages: beside this one where it is installed, three folders up in a clone."""
+"""The folder of the packages: beside this one if installed, three folders up in a clone."""
 
 
 def hidden(package: str) -> str:
-    """Return in one sentence what hides a package of this project from an import; empty where nothing does."""
+    """Return in one sentence what hides a package of this project from an import; an empty text if nothing does."""
     loaded = sys.modules.get(package)
     found = PathFinder.find_spec(package) if loaded is None else getattr(loaded, "__spec__", None)
     places = _places(found)

@@ -1,7 +1,7 @@
-"""A plug-in for pytest: the fixture `rotary_table` for anybody's tests, and the options of the conformance suite.
+"""A plug-in for pytest: the fixture `rotary_table` for any tests, and the options of the conformance suite.
 
-It is loaded by every run of pytest where this package is installed. It imports nothing of ours before a test uses the
-fixture, so that a project may have packages of the same names.
+Every run of pytest loads it if this package is installed. It imports no module of this project before a test uses the
+fixture, so that a project may have packages with the same names.
 """
 
 from collections.abc import Iterator
@@ -30,14 +30,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="the table for the fixture rotary_table and for the conformance suite: a device, a URL of pyserial's, or "
         f"`{PTY}` for a fresh emulator on a pseudo-terminal (default: {IN_PROCESS}, in process and in simulated time)",
     )
-    add("--table-profile", metavar="FILE", type=Path, help="TOML file of what is known of the table")
+    add("--table-profile", metavar="FILE", type=Path, help="TOML file with the properties of the table")
     add("--table-control", metavar="PATH", type=Path, help="the control channel of the emulator at the port")
-    add("--table-yes", action="store_true", help="a real table may be moved as the profile says")
+    add("--table-yes", action="store_true", help="a real table may be moved within the limits of the profile")
 
 
 @pytest.fixture
 def rotary_table_port(pytestconfig: pytest.Config) -> str:
-    """The port of `rotary_table`: what `--table-port` says. A module that needs another overrides this fixture."""
+    """The port of `rotary_table`, from `--table-port`. A module that needs another port overrides this fixture."""
     return str(pytestconfig.getoption("--table-port"))
 
 
@@ -45,15 +45,15 @@ def rotary_table_port(pytestconfig: pytest.Config) -> str:
 def rotary_table(
     rotary_table_port: str, pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator["RotaryTable"]:
-    """A table that is fresh for each test: `.client` talks to it, `.url` opens it, `.trigger()` is the probe."""
+    """A new table for each test: `.client` is a client, `.url` opens it, `.trigger()` is the probe."""
     for package in ("protocol", "emulator") if rotary_table_port.startswith(IN_PROCESS) else ("protocol",):
         if clash := hidden(package):
             pytest.fail(f"rotary_table: {clash}", pytrace=False)
-    from protocol.conformance.pytest.fixture import RotaryTable, pty_stand_in  # noqa: PLC0415 - see the module's docstring
+    from protocol.conformance.pytest.fixture import RotaryTable, pty_emulator  # noqa: PLC0415 - see the module's docstring
 
     control = pytestconfig.getoption("--table-control")
     with ExitStack() as stack:
         url = rotary_table_port
         if url == PTY:
-            url, control = stack.enter_context(pty_stand_in(tmp_path_factory.mktemp("table")))
+            url, control = stack.enter_context(pty_emulator(tmp_path_factory.mktemp("table")))
         yield stack.enter_context(RotaryTable(url, control, pytestconfig.getoption("--table-profile")))

@@ -1,4 +1,4 @@
-"""The watch over the machine that tests, held against a process that is stopped for a known time."""
+"""The watch over the testing machine, compared with a process that is stopped for a known time."""
 
 import signal
 import subprocess

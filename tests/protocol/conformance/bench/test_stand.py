@@ -1,4 +1,4 @@
-"""What stands beside the wire: here the programs that a profile names, as the bench of a real table has them."""
+"""Actions besides the wire: here the programs that a profile names, as for a real table."""
 
 import json
 import os
@@ -27,7 +27,7 @@ FAILURE = ("sh", "-c", "echo the relay is stuck >&2; exit 3")
 
 
 def outcomes_with(stand: Programs, *prefixes: str) -> tuple[list[Outcome], Mutant]:
-    """Run cases on a right table that stands at 33 deg, beside which there are programs only."""
+    """Run cases on a correct table that stands at 33 deg; the rig has only programs."""
     port = port_to(Mutant)
     port.write(b"P 33\r")
     port.clock.sleep_s(10)
@@ -46,7 +46,7 @@ def test_what_has_a_program_can_be_done() -> None:
     ("command", "sentence"),
     [
         (FAILURE, "rig.trigger_command, `sh -c 'echo the relay is stuck >&2; exit 3'`, ended with status 3: the relay"),
-        (("false",), "rig.trigger_command, `false`, ended with status 1, and said nothing"),
+        (("false",), "rig.trigger_command, `false`, ended with status 1 without output"),
         (("sh", "-c", "kill -9 $$"), "ended with status -9"),
     ],
 )
@@ -82,7 +82,7 @@ def test_a_program_that_is_not_there_is_told_before_anything_moves(
     words = ["--port", "loop://", "--yes", "--profile", str(profile), "--out", str(tmp_path / "out")]
     assert main(words) == 2
     said = capsys.readouterr().err
-    assert "rig.trigger_command: there is no program 'no-such-program' here" in said
+    assert "rig.trigger_command: program not found: 'no-such-program'" in said
     assert said.count("\n") == 1
 
 
@@ -109,7 +109,7 @@ def test_a_power_switch_that_fails_leaves_home_where_it_is() -> None:
 
 
 class SwitchesAndFails(Stand):
-    """A power switch that does its work, and then fails."""
+    """A power switch that switches, and then fails."""
 
     capabilities = frozenset({POWER_CYCLE})
 
@@ -125,10 +125,11 @@ def test_a_power_switch_that_fails_when_it_is_done_makes_no_other_place_home() -
     port = port_to(Mutant)
     port.write(b"P 33\r")
     port.clock.sleep_s(10)
+    assert isinstance(port.table, Table)
     session = Session(RecordedPort(port), load_profile(), SwitchesAndFails(port.table))
     verdicts = [outcome.verdict for outcome in session.run(chosen_cases(["4.6/5", "7.2/1"]))]
     assert verdicts == [Verdict.ERROR, Verdict.PASS]
-    assert round(port.table.status().encoder_deg, 1) == 0.0  # what was 33 deg is 0 now
+    assert round(port.table.status().encoder_deg, 1) == 0.0  # the former 33 deg are now 0
 
 
 @pytest.mark.parametrize("case", ["6.2/1", "6.2/2", "4.3/2"])
@@ -161,8 +162,8 @@ def test_a_table_is_triggered_and_switched_by_programs_alone(tmp_path: Path) -> 
         f"[rig]\ntrigger_command = {json.dumps([*client, 'trigger'])}\n"
         f"power_cycle_command = {json.dumps([*client, 'reset'])}\n"
     )
-    stand_in = [sys.executable, "-m", "emulator", "--tcp", "0", "--control", str(control)]
-    with subprocess.Popen(stand_in, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+    start_emulator = [sys.executable, "-m", "emulator", "--tcp", "0", "--control", str(control)]
+    with subprocess.Popen(start_emulator, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         assert process.stdout is not None
         port = process.stdout.readline().strip()
         words = ["--port", port, "--profile", str(profile), "--yes", "--case", "6.1/5", "--case", "6.2/2"]

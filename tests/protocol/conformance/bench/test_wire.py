@@ -1,4 +1,4 @@
-"""Lines and silence on the wire, from tables that take their time and from what is no table."""
+"""Lines and silence on the wire, from slow tables and from devices that are not a table."""
 
 from collections.abc import Iterator
 from itertools import cycle
@@ -14,7 +14,7 @@ from tests.protocol.conformance.ideal_table import SimulatedClock
 
 
 class Bytes:
-    """A port at which bytes come in at their times, in simulated time."""
+    """A port that receives bytes at given times, in simulated time."""
 
     def __init__(self, coming: Iterator[tuple[float, bytes]]) -> None:
         self.clock = SimulatedClock()
@@ -53,7 +53,7 @@ def wire_with(*coming: tuple[float, bytes], byte_s: float = 0.0) -> Wire:
 
 
 class Flood(Bytes):
-    """A device that sends faster than anybody reads, without end."""
+    """A device that sends without end, faster than the kit reads."""
 
     def __init__(self, data: bytes) -> None:
         super().__init__(iter(()))
@@ -96,12 +96,12 @@ def test_a_flood_is_not_heard_out() -> None:
 @pytest.mark.parametrize("data", [b"x", b"H 0.0\r"])
 def test_a_device_that_floods_is_no_table(data: bytes) -> None:
     wire = Wire(RecordedPort(Flood(data)))
-    with pytest.raises(SessionError, match=r"talks without being asked: b'.{,60}'...; this is no table"):
+    with pytest.raises(SessionError, match=r"sends without a command: b'.{,60}'...; this is not a table"):
         resting_position(wire, load_profile(), Punctual())
 
 
 def test_what_whoever_was_there_before_did_not_read_is_no_answer() -> None:
     old = b"ERR 5 bad byte\rH 7.0\r"
     wire = wire_with(*((0.2 + index / 100, bytes([byte])) for index, byte in enumerate(old)))
-    with pytest.raises(SessionError, match="no answer to 'H' within 1 s"):
+    with pytest.raises(SessionError, match="no reply to 'H' within 1 s"):
         resting_position(wire, load_profile(), Punctual())

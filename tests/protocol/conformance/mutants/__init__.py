@@ -1,4 +1,4 @@
-"""Deliberately wrong tables: each breaks one rule, and names the case that is there to catch it."""
+"""Deliberately wrong tables: each violates one rule, and names the case that must detect it."""
 
 from tests.protocol.conformance.mutants import (
     grammar,

@@ -9,7 +9,7 @@ from tests.protocol.conformance.mutants.mutant import Line, Mutant, RereadsLines
 
 @caught_by("4.1/1")
 class TakesLowerCase(Mutant):
-    """lower case is as good"""
+    """lowercase letters are accepted"""
 
     def receive(self, data: bytes) -> None:
         super().receive(data.upper())
@@ -17,7 +17,7 @@ class TakesLowerCase(Mutant):
 
 @caught_by("4.1/4")
 class TakesTheFirstNumber(Mutant):
-    """of two numbers the first is taken"""
+    """of two numbers the first is used"""
 
     def receive(self, data: bytes) -> None:
         super().receive(re.sub(rb"([PRSA] [0-9.]+) [0-9. ]+\r", rb"\1\r", data))
@@ -52,7 +52,7 @@ class StopsWhenItRefuses(Mutant):
 
 @caught_by("4.1/10")
 class CutsWhatItRefuses(Mutant):
-    """a speed above the limit is refused, and yet cut to the limit"""
+    """a speed above the limit is refused, but reduced to the limit"""
 
     def _reply(self, command: Line) -> bytes:
         if isinstance(command, Command) and command.verb is Verb.SET_SPEED and value_of(command) > 40:
@@ -62,7 +62,7 @@ class CutsWhatItRefuses(Mutant):
 
 @caught_by("4.6/3")
 class SaysOkFirst(Mutant):
-    """OK comes before the number is looked at"""
+    """OK is sent before the number is checked"""
 
     def _reply(self, command: Line) -> bytes:
         reply = super()._reply(command)
@@ -87,7 +87,7 @@ class NeedsASpace(Mutant):
 
 @caught_by("4.1/3")
 class OverlooksWhatFollows(Mutant):
-    """what follows a reading's letter is overlooked"""
+    """text after a reading's letter is ignored"""
 
     def receive(self, data: bytes) -> None:
         super().receive(re.sub(rb"(^|\r)([HL])[^\r]+(?=\r)", rb"\1\2", data))

@@ -13,7 +13,7 @@ from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by
 
 @caught_by("2.1/3")
 class HonorsXoff(Mutant):
-    """XOFF silences it"""
+    """XOFF stops its replies"""
 
     deaf = False
 
@@ -65,7 +65,7 @@ class AnswersEmptyLines(Mutant):
 
 @caught_by("3.1/5")
 class KeepsHalfLines(Mutant):
-    """the half line of a client that left meets the next one"""
+    """the incomplete line of a client that left is joined to the next one"""
 
     def disconnect(self) -> None:
         self._serial.uart.disconnect()
@@ -73,7 +73,7 @@ class KeepsHalfLines(Mutant):
 
 @caught_by("3.2/2")
 class CutsLongLines(Mutant):
-    """a long line is cut, and its beginning carried out"""
+    """a long line is cut, and its start executed"""
 
     def receive(self, data: bytes) -> None:
         super().receive(b"\r".join(line[:32] for line in data.split(b"\r")))
@@ -81,7 +81,7 @@ class CutsLongLines(Mutant):
 
 @caught_by("3.2/2")
 class CountsInAByte(Mutant):
-    """the length of a line is a byte, and begins anew after 255"""
+    """the length of a line is a byte, and starts again after 255"""
 
     def receive(self, data: bytes) -> None:
         super().receive(re.sub(rb"([^\r])[^\r]{256}\r", rb"\1\r", data))
@@ -97,7 +97,7 @@ class CountsEachPieceAlone(Mutant):
 
 @caught_by("3.2/3")
 class EditsItsLine(Mutant):
-    """a backspace takes the byte before it back, for terminals"""
+    """a backspace deletes the previous byte, as on terminals"""
 
     def receive(self, data: bytes) -> None:
         super().receive(re.sub(rb"[^\r]?\x08", b"", data))
@@ -105,7 +105,7 @@ class EditsItsLine(Mutant):
 
 @caught_by("3.2/3")
 class IgnoresBadBytes(Mutant):
-    """bad bytes are passed over"""
+    """bad bytes are ignored"""
 
     def receive(self, data: bytes) -> None:
         super().receive(bytes(byte for byte in data if 0x20 <= byte < 0x7F or byte in b"\r\n"))
@@ -153,12 +153,12 @@ class ComputesInMidReply(Mutant):
 
 class ForgivingBuffer(LineBuffer):
     def spoil(self) -> None:
-        """Overlook what was lost."""
+        """Ignore lost bytes."""
 
 
 @caught_by("2.3/2")
 class OverlooksLostBytes(Mutant):
-    """a line that lost bytes is read as if it were whole"""
+    """a line that lost bytes is read as if it were complete"""
 
     def __init__(self, config: TableConfig, seed: int = 0) -> None:
         super().__init__(config, seed)
@@ -167,7 +167,7 @@ class OverlooksLostBytes(Mutant):
 
 @caught_by("2.3/3")
 class LocksUpWhenOverrun(Mutant):
-    """an overrun shuts the receiver for good, as a flag that nobody clears"""
+    """an overrun stops the receiver permanently, because a flag is not cleared"""
 
     def receive(self, data: bytes) -> None:
         if not self._serial.uart.lost_bytes:
@@ -176,7 +176,7 @@ class LocksUpWhenOverrun(Mutant):
 
 @caught_by("3.1/4")
 class WantsWholeLines(Mutant):
-    """a line counts only in one piece"""
+    """a line counts only if it arrives in one piece"""
 
     def receive(self, data: bytes) -> None:
         super().receive(data if data.endswith(b"\r") else b"")
@@ -192,7 +192,7 @@ class ShortLines(Mutant):
 
 @caught_by("3.2/4")
 class LengthBeforeBytes(Mutant):
-    """of two faults that of length is answered"""
+    """of two faults the length error is reported"""
 
     def receive(self, data: bytes) -> None:
         super().receive(re.sub(rb"[^\r]{33,}\r", b" " * 33 + b"\r", data))
@@ -200,7 +200,7 @@ class LengthBeforeBytes(Mutant):
 
 @caught_by("3.2/5")
 class LongLinesDrag(Mutant):
-    """a line too long spoils the next one"""
+    """a line that is too long makes the next one invalid"""
 
     spoiled = False
 
@@ -231,7 +231,7 @@ for each_s in (0.1, 1.0, 5.0):
 
 @caught_by("3.1/4")
 class SilenceEndsALine(Mutant):
-    """a half line is carried out after 2 s of silence"""
+    """an incomplete line is executed after 2 s of silence"""
 
     last_tick, is_half = 0, False
 
@@ -250,7 +250,7 @@ class SilenceEndsALine(Mutant):
 
 @caught_by("3.1/2")
 class SkipsWhatFollowsCr(Mutant):
-    """after CR it waits for LF or for the next CR where LF has come before"""
+    """after CR it waits for LF or for the next CR, if LF was received before"""
 
     def receive(self, data: bytes) -> None:
         super().receive(re.sub(rb"\r\n[^\r]*(?=\r)", b"\r", data))

@@ -8,7 +8,7 @@ from tests.protocol.conformance.mutants.mutant import MOTIONS, Line, Mutant, Rer
 
 
 class Scales(Mutant):
-    """Moves with other S and A than were set."""
+    """Moves with other values of S and A than set."""
 
     speed_percent = rate_percent = 100
 
@@ -38,7 +38,7 @@ class TooFast(Scales):
 
 @caught_by("7.1/1:backwards")
 class LazyBackwards(Scales):
-    """backwards it accelerates a seventh less than A"""
+    """in the backward direction it accelerates a seventh less than A"""
 
     says = "acceleration"
     rate_percent = 85
@@ -50,7 +50,7 @@ class LazyBackwards(Scales):
 
 @caught_by("7.1/2")
 class NoTriangles(Scales):
-    """a short way is a trapezoid too, with a lower speed"""
+    """a short motion is a trapezoid too, with a lower speed"""
 
     def scaled(self, command: Command) -> tuple[int, int]:
         speed, acceleration, _ = self._registers
@@ -79,7 +79,7 @@ class LazyTriangles(Scales):
 class RoundsTheSpeedUp(Scales):
     """S is rounded up to the next step of its timer, a fifth above"""
 
-    says = "highest speed"
+    says = "maximum speed"
     speed_percent = 120
 
 
@@ -99,7 +99,7 @@ class StopsShort(Rereads):
 
 
 class InTwoSteps(StopsShort):
-    """Stops beside its target, and then goes on to it, with a share of S."""
+    """Stops beside its target, and then continues to it, with a share of S."""
 
     second: Command | None = None
     slower = 1
@@ -119,7 +119,7 @@ class InTwoSteps(StopsShort):
 
 @caught_by("7.1/4")
 class Overshoots(InTwoSteps):
-    """it passes its target by a third of a degree, and comes back"""
+    """it passes its target by a third of a degree, and returns"""
 
     says = "farthest position"
     short_deg = Decimal("-0.33")
@@ -136,9 +136,9 @@ class CreepsHome(InTwoSteps):
 
 @caught_by("7.2/1")
 class CreepsOn(InTwoSteps):
-    """after a motion it creeps on"""
+    """after a motion it continues to creep"""
 
-    says = "at rest the table was read at"
+    says = "readings at rest range from"
     slower = 200
 
     def instead(self, command: Command) -> Command:

@@ -1,4 +1,4 @@
-"""What a deliberately wrong table is made of, and the register of all of them."""
+"""The parts of deliberately wrong tables, and the register of all of them."""
 
 from collections.abc import Callable
 from decimal import Decimal
@@ -32,10 +32,10 @@ def value_of(command: Command) -> Decimal:
 
 
 class Mutant(Table):
-    """Short ways to the table's inside."""
+    """Short names for the table's internals."""
 
     says = ""
-    """Words that the case has for what is wrong."""
+    """Words of the case for the error."""
 
     @property
     def moving(self) -> bool:
@@ -55,7 +55,7 @@ class Mutant(Table):
         return Decimal(fixed + reference.distance_fraction) / (1 << self.bits) / 512
 
     def braking_way(self) -> Decimal:
-        """How far the reference still goes when it brakes now with the acceleration of its motion."""
+        """Remaining travel of the reference if it brakes now with the acceleration of its motion."""
         speed, acceleration = self._loop.state.firmware.reference.speed, self._loop.state.firmware.profile.acceleration
         return Decimal(speed * abs(speed) // (2 * acceleration)) / (1 << self.bits) / 512
 
@@ -67,14 +67,14 @@ class Mutant(Table):
         )
 
     def step_to(self, speed: int) -> None:
-        """Let the reference have another speed at once."""
+        """Change the speed of the reference at once."""
         controller = self._loop.state.firmware
         stepped = controller._replace(reference=controller.reference._replace(speed=speed))
         self._loop.state = self._loop.state._replace(firmware=stepped)
 
 
 class RereadsLines(Mutant):
-    """Takes a line for another one."""
+    """Reads a line as another one."""
 
     def instead_of(self, line: bytes) -> bytes:
         raise NotImplementedError
@@ -84,7 +84,7 @@ class RereadsLines(Mutant):
 
 
 class RereadsNumbers(Mutant):
-    """Takes the number of some commands for another one."""
+    """Reads the number of some commands as another one."""
 
     verbs = frozenset({Verb.MOVE_TO, Verb.MOVE_BY, Verb.SET_SPEED, Verb.SET_ACCELERATION})
 
@@ -98,7 +98,7 @@ class RereadsNumbers(Mutant):
 
 
 class Rereads(Mutant):
-    """Carries a motion command out as another one, or says `OK` and passes it over."""
+    """Executes a motion command as another one, or sends `OK` and ignores it."""
 
     def instead(self, command: Command) -> Command | None:
         raise NotImplementedError
@@ -111,11 +111,11 @@ class Rereads(Mutant):
 
 
 MUTANTS: dict[str, tuple[str, type[Mutant]]] = {}
-"""By what is wrong: the case that catches it, and the table."""
+"""By error: the case that detects it, and the table."""
 
 
 def caught_by(case: str) -> Callable[[type[Mutant]], type[Mutant]]:
-    """Register a wrong table with the id of the very case that is there to catch it."""
+    """Register a wrong table with the id of the case that must detect it."""
 
     def register(kind: type[Mutant]) -> type[Mutant]:
         assert kind.__doc__

@@ -6,7 +6,7 @@ from tests.protocol.conformance.mutants.mutant import MOTIONS, Line, Mutant, Rer
 
 @caught_by("7.3/1")
 class FinishesFirst(Rereads):
-    """a target that comes in a motion is passed over"""
+    """a target during a motion is ignored"""
 
     def instead(self, command: Command) -> Command | None:
         return None if self.moving and command.verb is Verb.MOVE_TO else command
@@ -27,7 +27,7 @@ class Debounces(Rereads):
 
 @caught_by("7.3/7")
 class QueuesMotions(Rereads):
-    """motions are carried out one after the other"""
+    """motions are executed one after the other"""
 
     queue: tuple[Command, ...] = ()
 
@@ -58,7 +58,7 @@ class QueuesWhatLiesBehind(QueuesMotions):
 
 
 class StepsToStandstill(Rereads):
-    """Begins a new motion from speed 0, at once, where it has a mind to."""
+    """Starts a new motion from speed 0, at once, under a condition."""
 
     def steps(self, command: Command) -> bool:
         raise NotImplementedError
@@ -71,7 +71,7 @@ class StepsToStandstill(Rereads):
 
 @caught_by("7.3/2")
 class StepsAtPreemption(StepsToStandstill):
-    """at a new target the reference's speed steps to 0"""
+    """at a new target the speed of the reference steps to 0"""
 
     def steps(self, command: Command) -> bool:  # noqa: ARG002 - at each
         return True
@@ -87,7 +87,7 @@ class BeginsAgain(StepsToStandstill):
 
 @caught_by("7.3/3:reversal")
 class TurnsOnTheSpot(StepsToStandstill):
-    """going backwards it does not brake for a target behind"""
+    """in the backward direction it does not brake for a target behind"""
 
     def steps(self, command: Command) -> bool:
         return self._loop.state.firmware.reference.speed < 0 and value_of(command) > self.position()
@@ -95,7 +95,7 @@ class TurnsOnTheSpot(StepsToStandstill):
 
 @caught_by("7.3/3:near")
 class BrakesTooHard(Rereads):
-    """it brakes harder than with A where it would pass its target"""
+    """it brakes harder than A if it would pass its target"""
 
     def instead(self, command: Command) -> Command:
         way, braking_way = value_of(command) - self.position(), self.braking_way()
@@ -107,7 +107,7 @@ class BrakesTooHard(Rereads):
 
 @caught_by("7.3/3:stop")
 class DoesNotReturn(Rereads):
-    """R 0 stops it for good where it comes to a stand"""
+    """R 0 stops it permanently where it comes to rest"""
 
     def instead(self, command: Command) -> Command:
         stop = command.verb is Verb.MOVE_BY and value_of(command) == 0
@@ -127,7 +127,7 @@ class StepsToALowerSpeed(Mutant):
 
 
 class KeepsTheOld(Mutant):
-    """Goes on with an old setting when a motion replaces another."""
+    """Keeps an old setting when a motion replaces another."""
 
     def kept(self, speed: int, acceleration: int) -> tuple[int, int]:
         """Return the settings of the new motion, from those of the old one."""
@@ -166,7 +166,7 @@ class KeepsAHigherAcceleration(KeepsTheOld):
 
 
 class StartsFromTheMotor(Rereads):
-    """Starts a motion that replaces another from what was measured of the motor."""
+    """Starts a motion that replaces another from the measured state of the motor."""
 
     def start_from(self, speed: int) -> None:
         self.step_to(speed)

@@ -1,4 +1,4 @@
-"""Wrong tables: what `H` and `L` say, and in which form."""
+"""Wrong tables: the replies to `H` and `L`, and their form."""
 
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Decimal
 
@@ -8,7 +8,7 @@ from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by, v
 
 @caught_by("4.2/1")
 class TellsTheTarget(Mutant):
-    """H tells where the table is going to"""
+    """H returns the target of the motion"""
 
     def _reply(self, command: Line) -> bytes:
         if verb_of(command) is Verb.READ_POSITION:
@@ -18,7 +18,7 @@ class TellsTheTarget(Mutant):
 
 @caught_by("4.2/2")
 class StalePosition(Mutant):
-    """the position is looked up ten times a second"""
+    """the position is updated ten times a second"""
 
     last = (-100, b"")
 
@@ -32,7 +32,7 @@ class StalePosition(Mutant):
 
 @caught_by("4.2/3")
 class Modulo360(Mutant):
-    """the position is told modulo 360"""
+    """the position is returned modulo 360"""
 
     def _reply(self, command: Line) -> bytes:
         if verb_of(command) is Verb.READ_POSITION:
@@ -42,7 +42,7 @@ class Modulo360(Mutant):
 
 @caught_by("4.2/4")
 class ReadingLatches(Mutant):
-    """the position is read by way of the latch, which keeps it"""
+    """reading the position overwrites the latch"""
 
     def _reply(self, command: Line) -> bytes:
         if verb_of(command) is Verb.READ_POSITION:
@@ -81,7 +81,7 @@ class LatchIsThePosition(Mutant):
 
 @caught_by("5.2/1")
 class LatchInCounts(Mutant):
-    """L tells the latch in counts"""
+    """L returns the latch in counts"""
 
     def _reply(self, command: Line) -> bytes:
         if verb_of(command) is Verb.READ_LATCH:
@@ -90,7 +90,7 @@ class LatchInCounts(Mutant):
 
 
 class Renders(Mutant):
-    """Tells angles in another form."""
+    """Returns angles in another form."""
 
     def form(self, angle: Decimal) -> str:
         raise NotImplementedError

@@ -1,4 +1,4 @@
-"""Wrong tables: what a client relies on to find its place again."""
+"""Wrong tables: rules that let a client resynchronize."""
 
 from protocol.messages import Verb
 from tests.protocol.conformance.mutants.mutant import Line, Mutant, caught_by, verb_of
@@ -14,7 +14,7 @@ class AlmostEnoughBuffer(Mutant):
 
 @caught_by("8.3/1")
 class CancelIsIgnored(Mutant):
-    """CAN is passed over, and the half line carried out"""
+    """CAN is ignored, and the incomplete line is executed"""
 
     def receive(self, data: bytes) -> None:
         super().receive(data.replace(b"\x18", b""))
@@ -30,7 +30,7 @@ class AnswersReadingsTwice(Mutant):
 
 @caught_by("8.3/3")
 class LooksForAnotherRate(Mutant):
-    """noise makes it look for another rate, until it is switched off"""
+    """after noise it searches for another baud rate, until it is switched off"""
 
     noise = 0
 
@@ -42,7 +42,7 @@ class LooksForAnotherRate(Mutant):
 
 @caught_by("8.3/4")
 class CancelEmptiesTheBuffer(Mutant):
-    """CAN drops what was sent with it"""
+    """CAN drops the bytes sent with it"""
 
     def receive(self, data: bytes) -> None:
         head, cancel, _ = data.partition(b"\x18")

@@ -25,7 +25,7 @@ class SwapsReplies(Mutant):
 
 @caught_by("5.1/2")
 class SwapsRepliesUnderLoad(SwapsReplies):
-    """under load replies change places"""
+    """under load, replies are exchanged"""
 
     def holds_back(self, command: Line) -> bool:  # noqa: ARG002 - each is as good
         return self._serial.uart.waiting_count > 8
@@ -49,7 +49,7 @@ class AnswersTwice(Mutant):
 
 @caught_by("5.1/3")
 class AnnouncesArrival(Mutant):
-    """the end of a motion is announced"""
+    """the end of a motion is reported"""
 
     was_moving = False
 
@@ -84,7 +84,7 @@ for each in ErrorCode:
 
 @caught_by("5.4/1")
 class AnswersBadLines(Mutant):
-    """in strict mode a line that is no line at all is still answered"""
+    """in strict mode an invalid line is still answered"""
 
     def _reply(self, command: Line) -> bytes:
         return encode_reply(Refusal(command)) if isinstance(command, ErrorCode) else super()._reply(command)

@@ -29,7 +29,7 @@ class AccelerationAtOnce(Mutant):
 
 
 class ForgetsAfterAMotion(Mutant):
-    """Puts settings back to those of power-on once they were used."""
+    """Resets settings to those of power-on once they were used."""
 
     forgotten = ""
 
@@ -88,7 +88,7 @@ class ResetsForANewClient(Mutant):
 
 
 class WakesOtherwise(Mutant):
-    """Wakes with half of what a setting should be."""
+    """Starts with half of the value of a setting."""
 
     halved = ""
 
@@ -113,7 +113,7 @@ class WakesLazy(WakesOtherwise):
 
 @caught_by("6.1/5")
 class KeepsItsCount(Mutant):
-    """the position outlives the power"""
+    """the position is kept without power"""
 
     def reset(self, count: int = 0) -> None:
         super().reset(count or self._loop.state.firmware.counts[-1])
@@ -152,7 +152,7 @@ class CutsToItsLimit(Mutant):
 
 
 class LostInMotion(Mutant):
-    """Says `OK` to a setting that comes in a motion, and keeps the old one."""
+    """Sends `OK` to a setting during a motion, and keeps the old one."""
 
     verb = Verb.SET_SPEED
 

@@ -8,7 +8,7 @@ from tests.protocol.conformance.mutants.mutant import Line, Mutant, Rereads, cau
 
 @caught_by("4.4/1")
 class ShortWayRound(Rereads):
-    """P takes the short way round"""
+    """P takes the shorter direction"""
 
     def instead(self, command: Command) -> Command:
         if command.verb is Verb.MOVE_BY:
@@ -19,7 +19,7 @@ class ShortWayRound(Rereads):
 
 @caught_by("6.1/4")
 class SparesItsCable(Rereads):
-    """backwards it turns by half a turn at most"""
+    """in the backward direction it turns by half a turn at most"""
 
     def instead(self, command: Command) -> Command:
         if command.verb is Verb.MOVE_BY:
@@ -29,9 +29,9 @@ class SparesItsCable(Rereads):
 
 @caught_by("4.4/4")
 class OkIsArrival(Mutant):
-    """P is answered once the table is there"""
+    """P is answered when the table has arrived"""
 
-    says = "was there with its OK"
+    says = "had arrived when it sent OK"
     held = b""
 
     def _reply(self, command: Line) -> bytes:
@@ -60,7 +60,7 @@ class IncrementFromTheOldTarget(Rereads):
 
 @caught_by("4.5/2")
 class IncrementFromTheDisplay(Rereads):
-    """R counts from the position as it is told"""
+    """R counts from the reported position"""
 
     def instead(self, command: Command) -> Command:
         if command.verb is Verb.MOVE_TO:
@@ -70,7 +70,7 @@ class IncrementFromTheDisplay(Rereads):
 
 @caught_by("4.5/3")
 class IgnoresNothing(Rereads):
-    """R 0 is passed over as nothing to do"""
+    """R 0 is ignored because there is nothing to do"""
 
     def instead(self, command: Command) -> Command | None:
         return None if command.verb is Verb.MOVE_BY and value_of(command) == 0 else command
@@ -86,7 +86,7 @@ class TakesNothingForALittle(Rereads):
 
 
 class PassesOverFarOnes(Rereads):
-    """Says `OK` to what leads out of the counter, and does nothing."""
+    """Sends `OK` to a target beyond the counter, and does nothing."""
 
     verb = Verb.MOVE_TO
 
@@ -96,12 +96,12 @@ class PassesOverFarOnes(Rereads):
 
 @caught_by("4.4/2")
 class PassesOverFarTargets(PassesOverFarOnes):
-    """a position beyond the counter is passed over, not refused"""
+    """a position beyond the counter is ignored, not refused"""
 
 
 @caught_by("4.5/5")
 class PassesOverFarIncrements(PassesOverFarOnes):
-    """an increment beyond the counter is passed over, not refused"""
+    """an increment beyond the counter is ignored, not refused"""
 
     verb = Verb.MOVE_BY
 
@@ -137,7 +137,7 @@ class StopsAtTheEndOfTheCounter(Rereads):
 class StumblesOverTheEnd(Mutant):
     """at the end of the counter the reference's speed steps to 0"""
 
-    says = "over the end and back"
+    says = "past the limit and back"
 
     def advance(self, ticks: int) -> None:
         before = self._loop.state.firmware.reference.position_count

@@ -14,7 +14,7 @@ class LatchesLate(Mutant):
 
 @caught_by("6.2/1")
 class LatchesForwards(Mutant):
-    """it latches in motions forwards only"""
+    """it latches only in forward motions"""
 
     def trigger(self, fraction: float = 0.0) -> None:
         if self._loop.state.firmware.reference.speed >= 0:
@@ -23,7 +23,7 @@ class LatchesForwards(Mutant):
 
 @caught_by("6.2/2")
 class LatchesOnce(Mutant):
-    """the first trigger is the last"""
+    """the first trigger is the only one"""
 
     latched = False
 
@@ -35,7 +35,7 @@ class LatchesOnce(Mutant):
 
 @caught_by("6.2/2")
 class WaitsToBeRead(Mutant):
-    """a trigger is passed over until the last one was read"""
+    """a trigger is ignored until the last one was read"""
 
     unread = False
 
@@ -68,7 +68,7 @@ class FollowsUntilTriggered(Mutant):
 
 @caught_by("6.2/3")
 class SpeaksAtTriggers(Mutant):
-    """a trigger is answered"""
+    """a trigger has a reply"""
 
     def trigger(self, fraction: float = 0.0) -> None:
         super().trigger(fraction)
@@ -76,7 +76,7 @@ class SpeaksAtTriggers(Mutant):
 
 
 class LosesEdges(Mutant):
-    """Passes an edge over."""
+    """Ignores an edge."""
 
     def is_lost(self) -> bool:
         raise NotImplementedError

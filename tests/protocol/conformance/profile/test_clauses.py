@@ -44,7 +44,7 @@ def test_each_case_has_a_prefix_that_chooses_it_alone() -> None:
 
 
 def test_a_prefix_of_nothing_is_an_error() -> None:
-    with pytest.raises(ValueError, match="no case begins with 9"):
+    with pytest.raises(ValueError, match="no case id starts with 9"):
         chosen_cases(["9"])
 
 

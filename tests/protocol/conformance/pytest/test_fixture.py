@@ -1,4 +1,4 @@
-"""The table that a test is given, on a pseudo-terminal: it takes faults, and does not go on when the test is over."""
+"""The fixture's table on a pseudo-terminal: it takes faults, and does not continue after the test."""
 
 import time
 from pathlib import Path
@@ -7,13 +7,13 @@ import pytest
 
 from emulator.control_client import request
 from protocol import ReplyTimeout
-from protocol.conformance.pytest.fixture import RotaryTable, pty_stand_in
+from protocol.conformance.pytest.fixture import RotaryTable, pty_emulator
 
 pytestmark = pytest.mark.realtime
 
 
 def test_a_table_on_a_pty_takes_faults(tmp_path: Path) -> None:
-    with pty_stand_in(tmp_path) as (url, control), RotaryTable(url, control, None) as table:
+    with pty_emulator(tmp_path) as (url, control), RotaryTable(url, control, None) as table:
         assert table.control is not None
         request(table.control, "fault-silence")
         with pytest.raises(ReplyTimeout):
@@ -23,7 +23,7 @@ def test_a_table_on_a_pty_takes_faults(tmp_path: Path) -> None:
 
 
 def test_a_table_is_stopped_though_the_test_closed_its_port(tmp_path: Path) -> None:
-    with pty_stand_in(tmp_path) as (url, control):
+    with pty_emulator(tmp_path) as (url, control):
         with RotaryTable(url, control, None) as table:
             table.client.move_to(300)
             table.client.close()

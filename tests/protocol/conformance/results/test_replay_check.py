@@ -1,4 +1,4 @@
-"""What a record would do to a table, told before anything is sent."""
+"""The effect of a record on a table, computed before anything is sent."""
 
 from collections.abc import Sequence
 from pathlib import Path

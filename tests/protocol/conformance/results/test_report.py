@@ -1,4 +1,4 @@
-"""The report: what a device sends is shown and never obeyed, and every mark lies within its picture."""
+"""The report: text from a device is shown but never interpreted, and every mark is within its picture."""
 
 import dataclasses
 import json

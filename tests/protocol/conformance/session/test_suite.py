@@ -35,7 +35,7 @@ def profile_with(tmp_path: Path, text: str) -> Profile:
     return load_profile(file)
 
 
-def test_the_stand_in_passes_every_case() -> None:
+def test_the_emulator_passes_every_case() -> None:
     outcomes = run("emulator://", load_profile())
     bad = [(outcome.case.id, outcome.reason) for outcome in outcomes if outcome.verdict is not Verdict.PASS]
     assert [case for case, _ in bad] == ["5.4/1", "5.4/2"], bad
@@ -110,7 +110,7 @@ def test_an_interrupted_case_leaves_the_table_where_it_stopped_when_the_session_
 
 
 class InterruptedOnItsWay(RecordedPort):
-    """Ctrl-C comes half a second after the table was sent home."""
+    """Ctrl-C comes half a second after the command to return home."""
 
     def write(self, data: bytes, /) -> int | None:
         written = super().write(data)
@@ -175,10 +175,10 @@ def test_what_a_table_lacks_is_skipped_with_its_reason(tmp_path: Path) -> None:
         if case.id in {"3.1/5", "5.2/4", "6.2/1", "7.1/1"}
     }
     assert reasons == {
-        "3.1/5": "a table that sees its client go not available",
+        "3.1/5": "a table that detects when its client disconnects not available",
         "5.2/4": "waived by the profile: its printf",
         "6.2/1": "a trigger input that the rig can drive not available",
-        "7.1/1": "turns by 30 deg, the profile allows 10",
+        "7.1/1": "turns by 30 deg; the profile allows 10",
     }
 
 
@@ -198,19 +198,19 @@ def test_a_port_that_dies_is_an_error_of_the_case() -> None:
     port.table.inject(fault_from("hang-up", {"at_s": port.clock.now_s() + 0.5}))
     outcomes = session.run(chosen_cases(["7.1/1"]))
     assert [outcome.verdict for outcome in outcomes] == [Verdict.ERROR] * 2
-    assert "the device has gone" in outcomes[0].reason
+    assert "the device has disappeared" in outcomes[0].reason
 
 
 def test_a_silent_port_cannot_be_tested() -> None:
     port = port_to(Mutant)
     port.table.inject(fault_from("silence", {}))
-    with pytest.raises(SessionError, match="no answer to 'H' within 1 s; is the table on"):
+    with pytest.raises(SessionError, match="no reply to 'H' within 1 s; check the power of the table"):
         Session(RecordedPort(port), load_profile(), InProcess(port.table))
 
 
 def test_a_port_that_is_no_table_cannot_be_tested() -> None:
     port = RecordedPort(serial.serial_for_url("loop://"))
-    with pytest.raises(SessionError, match="is no table of this protocol"):
+    with pytest.raises(SessionError, match="is not a table of this protocol"):
         Session(port, load_profile(), Stand())
 
 
@@ -243,15 +243,15 @@ def test_every_random_walk_finds_a_setting_that_is_lost_in_a_motion(wrong: str) 
             search(rig_on(port_to(MUTANTS[wrong][1]), seed), seed, SIMULATED, NonconformityError)
 
 
-def test_on_a_real_table_a_failing_walk_is_not_repeated_but_shrunk_on_the_stand_in() -> None:
+def test_on_a_real_table_a_failing_walk_is_not_repeated_but_shrunk_on_the_emulator() -> None:
     rigs = [rig_on(port_to(MUTANTS["R counts from the old target"][1]), seed) for seed in range(8)]
     for rig in rigs:
         rig.wire.port.inner = UnclockedPort(rig.wire.port.inner)
-    assert first_failure(rigs).endswith("the emulator walks the same way without fault")
+    assert first_failure(rigs).endswith("the emulator passes the same walk")
 
 
 def first_failure(rigs: Sequence[Rig]) -> str:
-    """Walk on one rig after the other until a walk fails, and return what it says."""
+    """Walk on one rig after the other until a walk fails, and return its message."""
     for rig in rigs:
         try:
             walk(rig)
@@ -261,7 +261,7 @@ def first_failure(rigs: Sequence[Rig]) -> str:
 
 
 class UnclockedPort:
-    """A port to a simulated table that does not say so."""
+    """A port to a simulated table without a clock of its own."""
 
     clock = None
 
@@ -287,7 +287,7 @@ class UnclockedPort:
         self._port.close()
 
 
-def test_the_default_profile_has_the_stand_ins_limits() -> None:
+def test_the_default_profile_has_the_emulators_limits() -> None:
     profile, config = load_profile(), load_config()
     assert (profile.limits.speed_deg_s, profile.power_on.speed_deg_s) == (
         config.limits.speed_deg_s,

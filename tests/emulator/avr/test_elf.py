@@ -1,0 +1,43 @@
+"""Reading a firmware's file: a damaged one is refused, never run."""
+
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from emulator.avr.elf import DATA_SPACE, ElfError, read_program
+from emulator.avr.toolchain import build_firmware
+from emulator.config.table_config import load_config
+from tests.emulator.avr.toolchain_mark import needs_toolchain
+
+HEADER = struct.pack("<16sHHIIIIIHHHHHH", b"\x7fELF\x01\x01", 2, 83, 1, 0, 0, 0, 0, 52, 32, 0, 40, 0, 0)
+
+
+def test_a_header_alone_is_an_empty_program() -> None:
+    assert read_program(HEADER) == (b"", {})
+
+
+@pytest.mark.parametrize("data", [b"", b"\x7fELF", b"MZ" + HEADER[2:], HEADER[:18] + b"\x03\0" + HEADER[20:]])
+def test_another_file_is_refused(data: bytes) -> None:
+    with pytest.raises(ElfError):
+        read_program(data)
+
+
+@given(st.data())
+def test_a_damaged_file_is_refused_or_read(data: st.DataObject) -> None:
+    damaged = bytearray(HEADER + bytes(80))
+    for _ in range(data.draw(st.integers(1, 6))):
+        damaged[data.draw(st.integers(0, len(damaged) - 1))] = data.draw(st.sampled_from([0, 1, 2, 40, 200, 255]))
+    try:
+        program = read_program(bytes(damaged))
+    except ElfError:
+        return
+    assert len(program.flash) < 1 << 20
+
+
+@needs_toolchain
+def test_flash_and_variables_of_the_firmware_are_found() -> None:
+    program = read_program(build_firmware(load_config()).read_bytes())
+    assert len(program.flash) < 16 * 1024
+    assert program.symbols["main"] < DATA_SPACE < program.symbols["controller"]

@@ -1,0 +1,56 @@
+"""Building: what is missing is named, and nothing is left half built."""
+
+from pathlib import Path
+
+import pytest
+
+from emulator.avr import toolchain
+from emulator.avr.errors import ToolchainError
+from emulator.avr.toolchain import build_firmware, build_simulator, lacking
+from emulator.config.table_config import load_config
+from tests.emulator.avr.toolchain_mark import needs_toolchain
+
+
+@pytest.fixture
+def no_compilers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    toolchain._version.cache_clear()  # noqa: SLF001  # it holds what an earlier test has found
+
+
+@pytest.mark.usefixtures("no_compilers")
+def test_a_missing_compiler_is_named_with_its_packages() -> None:
+    assert "avr-gcc is not installed; install the packages gcc, gcc-avr" in lacking()
+    for build in (lambda: build_firmware(load_config()), build_simulator):
+        with pytest.raises(ToolchainError, match="is not installed; install the packages"):
+            build()
+
+
+@needs_toolchain
+def test_a_source_that_does_not_compile_leaves_nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    (tmp_path / "main.c").write_text("int main(void) { return nothing; }", encoding="ascii")
+    with pytest.raises(ToolchainError, match="nothing"):
+        build_firmware(load_config(), tmp_path)
+    assert list((tmp_path / "cache" / "seventh-axis" / "firmware").iterdir()) == []
+
+
+@needs_toolchain
+def test_gains_for_another_tick_are_refused(tmp_path: Path) -> None:
+    gains = tmp_path / "gains.h"
+    gains.write_text(
+        "#define TABLE_GAINS_H\n#define GAINS_TICK_HZ 500L\n#define GAINS_SPEED_WINDOW_TICKS 8L\n"
+        "#define GAINS_DUTY_MAX 1023L\n",
+        encoding="ascii",
+    )
+    with pytest.raises(ToolchainError, match=r"gains\.h is for another tick, window or PWM"):
+        build_firmware(load_config(), gains=gains)
+
+
+@needs_toolchain
+def test_what_was_built_is_kept() -> None:
+    built = build_firmware(load_config())
+    assert build_firmware(load_config()) == built
+    assert built.is_file()

@@ -1,0 +1,83 @@
+"""Build the compiled firmware of a table: `table.elf` and `table.hex`, with its size and its longest tick.
+
+python -m tools.firmware --config table.toml --gains build/tune/gains.h --out build/firmware
+"""
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from shutil import copyfile
+
+from emulator.avr.errors import ChipError, ToolchainError
+from emulator.avr.header import CLOCK_HZ
+from emulator.avr.toolchain import build_firmware
+from emulator.config.table_config import ConfigError, TableConfig, load_config
+from protocol.command_line import Parser, program_name
+from protocol.ending import ended
+from protocol.whole_file import whole_file
+from tools.lockstep import PartingError, run_edges
+
+FLASH_BYTES = 32 * 1024
+RAM_BYTES = 2 * 1024
+_TICKS = 3000
+_EXPECTED = (ConfigError, ToolchainError, ChipError, PartingError, subprocess.CalledProcessError)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Build the firmware, and return the exit status."""
+    options = parser().read(arguments)
+    return ended("firmware", lambda: _run(options), *_EXPECTED)
+
+
+def parser() -> Parser:
+    """Return the parser of the command line."""
+    parser = Parser(
+        prog=program_name("tools.firmware"),
+        description="Build the firmware for an ATmega328P, and run it in simavr for its longest tick.",
+    )
+    add = parser.add_argument
+    add("--config", metavar="FILE", type=Path, help="TOML file of the table (default: the default table)")
+    add("--gains", metavar="FILE", type=Path, help="gains.h of tools.tune (default: the gains of the table)")
+    add("--out", metavar="DIR", type=Path, default=Path("build/firmware"), help="output folder (default: %(default)s)")
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    config = load_config(options.config)
+    built = build_firmware(config, gains=options.gains)
+    elf, hexadecimal = options.out / "table.elf", options.out / "table.hex"
+    options.out.mkdir(parents=True, exist_ok=True)
+    with whole_file(elf) as partial:
+        copyfile(built, partial)
+    with whole_file(hexadecimal) as partial:
+        subprocess.run(["avr-objcopy", "-O", "ihex", str(elf), str(partial)], check=True)  # noqa: S607  # on the path, as avr-gcc
+    for line in figures(config, elf):
+        print(line)
+    return 0
+
+
+def figures(config: TableConfig, elf: Path) -> list[str]:
+    """Return the size of a firmware, and its longest tick at the most edges a second both ways, with a busy line."""
+    flash, ram = sizes(elf)
+    tick_cycles = CLOCK_HZ // config.control.tick_hz
+    chip = run_edges(config, _TICKS, firmware=elf)
+    return [
+        f"flash {flash} of {FLASH_BYTES} bytes ({flash / FLASH_BYTES:.0%})",
+        f"RAM {ram + chip.stack_bytes} of {RAM_BYTES} bytes ({(ram + chip.stack_bytes) / RAM_BYTES:.0%}), "
+        f"{chip.stack_bytes} of them stack",
+        f"longest tick {chip.longest_tick} of {tick_cycles} cycles ({chip.longest_tick / tick_cycles:.0%})",
+        f"firmware: {elf}",
+    ]
+
+
+def sizes(elf: Path) -> tuple[int, int]:
+    """Return the bytes of flash and of RAM that a firmware takes, without the stack."""
+    output = subprocess.run(["avr-size", str(elf)], check=True, capture_output=True, text=True).stdout  # noqa: S607  # on the path, as avr-gcc
+    text, data, bss = (int(word) for word in output.splitlines()[1].split()[:3])
+    return text + data, data + bss
+
+
+if __name__ == "__main__":
+    sys.exit(main())
