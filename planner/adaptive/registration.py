@@ -21,8 +21,8 @@ from planner.geometry.transforms import rigid_inverse, rotations_z
 
 _COARSE_POINTS = 1500
 """Points of a cloud, about, when guesses are tried."""
-_GUESSES, _YAW_STEP_DEG = 100, 30.0
-_REFINED, _HOPEFUL_SHARE = 8, 0.6
+_GUESSES, _YAW_STEP_DEG = 72, 30.0
+_REFINED, _HOPEFUL_SHARE = 6, 0.6
 """Poses that are refined at most, and what share of the largest overlap makes one hopeful."""
 _FEWEST_POINTS = 100
 _FAR_SHARE, _NEAR_CELLS = 0.15, 1.5
@@ -35,8 +35,9 @@ _CONTRADICTION = 2.0
 _MOST_CONTRADICTED = 0.1
 _FEWEST_SHARE = 0.15
 """Of the smaller cloud, that must overlap."""
-_RIVAL_SHARE, _RIVAL_RESIDUAL = 0.85, 1.5
-"""Another pose fits as well when it has this share of the overlap at this ratio of the residual."""
+_RIVAL_SHARE, _RIVAL_RESIDUAL, _RIVAL_MORE = 0.85, 1.5, 0.03
+"""Another pose fits as well when it has this share of the overlap, this ratio of the residual, and so many more
+contradictions."""
 _OTHER_DEG, _OTHER_SHARE = 8.0, 0.03
 """How far two poses of the part are apart to be two: by rotation, or by a share of its size."""
 _WEAKEST = 0.03
@@ -101,7 +102,7 @@ def join(first: Cloud, second: Cloud, about_12: FloatArray) -> Joined | str:
     guess = CoarseAlignment(coarse.first, _FAR_SHARE * size_mm)
     found = [guess.aligned(coarse.second, T) for T in _guesses(coarse.first, coarse.second, about_12)]
     poses = [T for _, T in _best_first(coarse, _different(found, coarse, size_mm))]
-    judged = _best_first(fine, [fine.aligned(T, (2.0 * coarse_mm, _NEAR_CELLS * first.cell_mm)) for T in poses])
+    judged = _best_first(fine, [fine.aligned(T, (2.0 * coarse_mm, first.cell_mm)) for T in poses])
     best, T_12 = judged[0]
     fault = _fault(best, size_mm) or _rivalry(judged, second, size_mm)
     if fault is not None:
@@ -138,7 +139,8 @@ def _rivalry(judged: list[tuple[Overlap, FloatArray]], second: Cloud, size_mm: f
     """Return which other pose fits as well as the first one of all, or None."""
     best, T_12 = judged[0]
     for other, T in judged[1:]:
-        fits = other.worth > _RIVAL_SHARE * best.worth and other.residual_mm < _RIVAL_RESIDUAL * best.residual_mm
+        fits = other.share > _RIVAL_SHARE * best.share and other.contradicted < best.contradicted + _RIVAL_MORE
+        fits &= other.residual_mm < _RIVAL_RESIDUAL * best.residual_mm
         if fits and _are_apart(T, T_12, second, size_mm):
             return (
                 f"another pose fits as well, turned by {_apart(T, T_12, second)[0]:.0f} deg (overlap {other.share:.0%}"

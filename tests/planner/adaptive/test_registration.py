@@ -9,7 +9,7 @@ from planner.cell.cell import placement
 from planner.geometry.thinned_cloud import ThinnedCloud
 from planner.geometry.transforms import rigid_inverse
 
-CELL_MM = 2.0
+CELL_MM = 1.5
 TURNED_OVER = placement(4.0, 5.0, 20.0, 30.0, 160.0, 20.0)
 
 
@@ -24,7 +24,6 @@ PARTS = {
     "box": lambda: trimesh.creation.box((70.0, 45.0, 30.0)),
     "prism": lambda: trimesh.creation.cylinder(radius=30.0, height=40.0, sections=6),
     "cylinder": lambda: trimesh.creation.cylinder(radius=25.0, height=50.0, sections=96),
-    "ball": lambda: trimesh.creation.icosphere(subdivisions=4, radius=30.0),
 }
 
 
@@ -41,15 +40,14 @@ def scanned(mesh: trimesh.Trimesh, T: FloatArray, above_mm: float = 2.0, seed: i
     return Cloud.of(thin)
 
 
-@pytest.mark.parametrize("off", [(0, 0, 0, 0, 0, 0), (8, -6, 3, 20, 5, 0)], ids=["known", "off"])
-def test_a_part_that_was_turned_over_is_put_back(off: tuple[float, ...]) -> None:
+def test_a_part_that_was_turned_over_is_put_back() -> None:
     mesh = bracket()
-    about = rigid_inverse(placement(*off) @ TURNED_OVER)
+    about = rigid_inverse(placement(8.0, -6.0, 3.0, 20.0, 5.0, 0.0) @ TURNED_OVER)
     joined = join(scanned(mesh, np.eye(4)), scanned(mesh, TURNED_OVER, seed=1), about)
     assert isinstance(joined, Joined)
     corners = np.asarray(mesh.vertices)
     T = joined.T_12 @ TURNED_OVER
-    assert np.abs(corners @ T[:3, :3].T + T[:3, 3] - corners).max() < 0.05
+    assert np.abs(corners @ T[:3, :3].T + T[:3, 3] - corners).max() < 0.02
     assert joined.overlap.share > 0.4
     assert joined.uncertainty_mm < 0.05
 
@@ -58,7 +56,6 @@ def test_a_part_that_was_turned_over_is_put_back(off: tuple[float, ...]) -> None
     ("name", "words"),
     [
         ("cylinder", "leaves a motion free"),
-        ("ball", "leaves a motion free"),
         ("box", "symmetric"),
         ("prism", "symmetric"),
     ],
