@@ -19,9 +19,9 @@ from planner.adaptive.surroundings import Surroundings
 from planner.adaptive.visibility import sees
 from planner.adaptive.voxel_map import VoxelMap
 from planner.arrays import FloatArray, IndexArray
-from planner.cell.cell import Probe
 from planner.cell.obstacles import Obstacle
 from planner.cell.patterns import StripLayout, cylinder_rings
+from planner.cell.scan import Scan
 from planner.cell.scan_path import ScanPath, at_scan_speed
 from planner.cell.workpiece import Cylinder
 from planner.geometry.box_distance import FIELD
@@ -33,9 +33,10 @@ _BEYOND_MM = 0.5
 """How far a point may lie beyond the bounding cylinder: noise, and errors of the alignment."""
 _SURVEY_GAP_MM = 25.0
 """How far the cylinder is beyond the beginning of the range in the survey."""
+_SURVEY_STEP_S = 0.5
 _TARGETS, _WAYS_EACH = 60, 8
 _ROLLS_DEG = (0.0, 90.0)
-_LENGTH_MM, _STEP_S = 60.0, 0.5
+_LENGTH_MM = 60.0
 _FEWEST_POSES = 3
 _BATCH = 4
 """Strips that are chosen at once."""
@@ -46,31 +47,34 @@ _LEAST_WORTH = 3.0
 _MOST_TRIES = 30
 
 
-def survey(bounds: Cylinder, probe: Probe, speed_mm_s: float, step_s: float) -> ScanPath:
-    """Return rings about a bounding cylinder, which the range of the probe reaches into as far as is safe.
+def survey(scan: Scan, bounds: Cylinder, speed_mm_s: float) -> Scan:
+    """Return the scan of a bounding cylinder instead of the part: rings, near enough to see far into it.
 
     Args:
-        bounds: The cylinder.
-        probe: What can be measured.
+        scan: The cell and its limits; its workpiece and its path are left out.
+        bounds: The cylinder, in frame W.
         speed_mm_s: How fast the laser line moves over the cylinder.
-        step_s: Time from one location to the next.
     """
-    near = replace(probe, stand_off_mm=probe.nearest_mm + _SURVEY_GAP_MM)
-    waypoints = cylinder_rings(bounds, near, StripLayout())
-    return at_scan_speed(waypoints, speed_mm_s, step_s, near.stand_off_mm, near.line_width_mm)
+    probe = replace(scan.cell.probe, stand_off_mm=scan.cell.probe.nearest_mm + _SURVEY_GAP_MM)
+    waypoints = cylinder_rings(bounds, probe, StripLayout())
+    path = at_scan_speed(waypoints, speed_mm_s, _SURVEY_STEP_S, probe.stand_off_mm, probe.line_width_mm)
+    cell = replace(scan.cell, probe=probe)
+    return replace(scan, cell=cell, workpiece=bounds, mesh=bounds.mesh(), mesh_file=None, predefined_path=path)
 
 
 class UnknownPart:
     """Chooses strips from what the probe returned alone."""
 
-    def __init__(self, surroundings: Surroundings, probe: LaserProbe, bounds: Cylinder) -> None:
+    def __init__(self, surroundings: Surroundings, probe: LaserProbe, bounds: Cylinder, speed_mm_s: float) -> None:
         """Begin with nothing seen inside the cylinder.
 
         Args:
             surroundings: The cell.
             probe: What can be measured.
             bounds: A cylinder in frame W that holds the part.
+            speed_mm_s: How fast strips are swept.
         """
+        self._step_s = _LENGTH_MM / (POSES - 1) / speed_mm_s
         self._surroundings, self._probe, self._bounds = surroundings, probe, bounds
         self._voxels = VoxelMap(bounds, _VOXEL_MM)
         self._cloud = ThinnedCloud(_CELL_MM)
@@ -152,7 +156,7 @@ class UnknownPart:
         """Return up to a batch of strips that the arm can sweep, each worth the most beside those before it."""
         n, k = candidates.shape[:2]
         poses = allowed(self._surroundings, self.solid(), candidates.reshape(-1, 4, 4))
-        turn = int(self._surroundings.limits.speed_deg_s * _STEP_S / (360.0 / ANGLES))
+        turn = int(self._surroundings.limits.speed_deg_s * self._step_s / (360.0 / ANGLES))
         found = reach(poses.reshape(len(poses), n, k, -1), turn)
         swept = trimmed(candidates, found)
         strips = [swept[number] for number in usable(found, _FEWEST_POSES)]
@@ -166,7 +170,7 @@ class UnknownPart:
             if worth[best] < _LEAST_WORTH:
                 break
             self._count += 1
-            chosen.append(Strip(f"strip {self._count}", ScanPath(strips[best], _STEP_S)))
+            chosen.append(Strip(f"strip {self._count}", ScanPath(strips[best], self._step_s)))
             left[seen[best]] = 0.0
         return chosen
 

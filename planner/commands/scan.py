@@ -7,6 +7,7 @@ from pathlib import Path
 from planner.adaptive.adaptive_report import adaptive_document, adaptive_report, adaptive_summary
 from planner.adaptive.adaptive_scan import AdaptOptions, scan_adaptively
 from planner.cell.scan import Scan, load_scan, with_mesh
+from planner.cell.workpiece import Cylinder
 from planner.commands import options
 from planner.defaults import SHARE_SEEN
 from planner.errors import PlannerError
@@ -54,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     out: Path = arguments.out
     try:
-        if arguments.adapt is not None or not scan.has_path:
+        if arguments.adapt is not None or arguments.blind is not None or not scan.has_path:
             return _adaptive(scan, known, asked, arguments)
         scanned = scan_workpiece(scan, asked, out, lambda label: progress_line(label, sys.stderr))
         save_scan(out / "scan.json", scan_document(scanned))
@@ -70,7 +71,9 @@ def run(arguments: argparse.Namespace) -> int:
 def _adaptive(scan: Scan, known: Scan, asked: ScanOptions, arguments: argparse.Namespace) -> int:
     """Scan adaptively; `known` has the mesh that the strips are chosen by. Return the exit status."""
     out: Path = arguments.out
-    wanted = AdaptOptions(SHARE_SEEN if arguments.adapt is None else arguments.adapt, arguments.most_strips)
+    wanted = AdaptOptions(SHARE_SEEN if arguments.adapt is None else arguments.adapt, arguments.most_strips,
+        None if arguments.blind is None else Cylinder(*arguments.blind),
+    )  # fmt: skip
     found = scan_adaptively(
         scan, asked, wanted, out, lambda label: progress_line(label, sys.stderr), _show_strips, known
     )

@@ -48,8 +48,8 @@ def ball() -> trimesh.Trimesh:
 def surveyed(mesh: trimesh.Trimesh) -> tuple[UnknownPart, HandHeldProbe]:
     """Return the policy and the probe after the survey."""
     surroundings = Surroundings.of(scan())
-    policy, held = UnknownPart(surroundings, optics(), BOUNDS), HandHeldProbe(mesh, optics())
-    policy.take(None, held.sweep(survey(BOUNDS, surroundings.cell.probe, 25.0, 0.5).T_WS))
+    policy, held = UnknownPart(surroundings, optics(), BOUNDS, 30.0), HandHeldProbe(mesh, optics())
+    policy.take(None, held.sweep(survey(scan(), BOUNDS, 25.0).path.T_WS))
     return policy, held
 
 
@@ -93,15 +93,15 @@ def test_no_strip_is_asked_for_twice() -> None:
     ],
 )
 def test_surface_beyond_the_cylinder_ends_it(bounds: Cylinder, words: str) -> None:
-    narrow = UnknownPart(Surroundings.of(scan()), optics(), bounds)
-    seen = HandHeldProbe(cup(), optics()).sweep(survey(BOUNDS, scan().cell.probe, 25.0, 0.5).T_WS)
+    narrow = UnknownPart(Surroundings.of(scan()), optics(), bounds, 30.0)
+    seen = HandHeldProbe(cup(), optics()).sweep(survey(scan(), BOUNDS, 25.0).path.T_WS)
     with pytest.raises(PolicyError, match=words):
         narrow.take(None, seen)
 
 
 def test_it_is_a_policy_that_is_given_no_mesh() -> None:
     policy: Policy = surveyed(ball())[0]
-    assert list(inspect.signature(UnknownPart).parameters) == ["surroundings", "probe", "bounds"]
+    assert list(inspect.signature(UnknownPart).parameters) == ["surroundings", "probe", "bounds", "speed_mm_s"]
     assert not {"mesh", "workpiece", "mesh_file", "path"} & set(Surroundings.__dataclass_fields__)
     assert policy.next_strips()
 
