@@ -34,7 +34,7 @@ class CoarseAlignment:
             moved = some.moved(T_12)
             place = np.hstack((moved.points, self._far_mm * moved.normals))
             distances_mm, nearest = self._tree.query(place, distance_upper_bound=reach_mm)
-            near = np.flatnonzero(np.isfinite(distances_mm))
+            near, nearest = np.flatnonzero(np.isfinite(distances_mm)), np.asarray(nearest)
             if len(near) < _FEWEST:
                 break
             to, normals = self._first.points[nearest[near]], self._first.normals[nearest[near]]

@@ -177,7 +177,7 @@ class _Pair:
         """Return the overlap in a pose of the second cloud."""
         first, moved = self.first, self.second.moved(T_12)
         distances_mm, nearest = self._tree.query(moved.points, distance_upper_bound=_NEAR_CELLS * first.cell_mm)
-        near = np.flatnonzero(np.isfinite(distances_mm))
+        near, nearest = np.flatnonzero(np.isfinite(distances_mm)), np.asarray(nearest)
         near = near[np.einsum("ij,ij->i", moved.normals[near], first.normals[nearest[near]]) > _SAME_NORMAL]
         normals = first.normals[nearest[near]]
         across_mm = np.einsum("ij,ij->i", moved.points[near] - first.points[nearest[near]], normals)

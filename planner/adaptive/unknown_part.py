@@ -21,7 +21,7 @@ from planner.adaptive.voxel_map import VoxelMap
 from planner.arrays import FloatArray, IndexArray
 from planner.cell.obstacles import Obstacle
 from planner.cell.patterns import StripLayout, cylinder_rings
-from planner.cell.scan import Scan
+from planner.cell.scan import Scan, check_it_fits_the_table
 from planner.cell.scan_path import ScanPath, at_scan_speed
 from planner.cell.workpiece import Cylinder
 from planner.geometry.box_distance import FIELD
@@ -54,12 +54,17 @@ def survey(scan: Scan, bounds: Cylinder, speed_mm_s: float) -> Scan:
         scan: The cell and its limits; its workpiece and its path are left out.
         bounds: The cylinder, in frame W.
         speed_mm_s: How fast the laser line moves over the cylinder.
+
+    Raises:
+        WorkpieceError: The cylinder reaches beyond the table.
     """
+    mesh = bounds.mesh()
+    check_it_fits_the_table(mesh, scan.cell)
     probe = replace(scan.cell.probe, stand_off_mm=scan.cell.probe.nearest_mm + _SURVEY_GAP_MM)
     waypoints = cylinder_rings(bounds, probe, StripLayout())
     path = at_scan_speed(waypoints, speed_mm_s, _SURVEY_STEP_S, probe.stand_off_mm, probe.line_width_mm)
     cell = replace(scan.cell, probe=probe)
-    return replace(scan, cell=cell, workpiece=bounds, mesh=bounds.mesh(), mesh_file=None, predefined_path=path)
+    return replace(scan, cell=cell, workpiece=bounds, mesh=mesh, mesh_file=None, predefined_path=path)
 
 
 class UnknownPart:
