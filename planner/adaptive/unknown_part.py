@@ -44,7 +44,8 @@ _TRIED_FIRST = 200
 """Candidates whose reach is looked for at once, those that are worth most first."""
 _LEAST_WORTH = 3.0
 """What a strip has to be worth, in guesses."""
-_MOST_TRIES = 30
+_KEPT, _MOST_TRIES = 0.5, 30
+"""What a guess keeps of its worth with each strip that should have seen it and did not."""
 
 
 def survey(scan: Scan, bounds: Cylinder, speed_mm_s: float) -> Scan:
@@ -140,7 +141,7 @@ class UnknownPart:
         cells, inside = self._voxels.cells(self._guesses.places.points)
         tries = np.zeros(len(cells), dtype=np.int64)
         tries[inside] = self._tries[tuple(cells[inside].T)]
-        return np.asarray(self._guesses.weights * 0.5**tries)
+        return np.asarray(self._guesses.weights * _KEPT**tries)
 
     def _candidates(self, weights: FloatArray) -> FloatArray:
         """Return strips `(n, k, 4, 4)` over the guesses that are worth most."""
@@ -180,7 +181,7 @@ class UnknownPart:
         return chosen
 
     def _note(self, strip: Strip) -> None:
-        """Halve what the guesses are worth that a strip should have seen."""
+        """Lower what the guesses are worth that a strip should have seen."""
         last = np.array([len(strip.T_WS) - 1])
         seen = sees(self._estimate.caster, self._probe, strip.T_WS[np.newaxis], last, self._guesses.places)[0]
         cells, inside = self._voxels.cells(self._guesses.places.points[seen])
