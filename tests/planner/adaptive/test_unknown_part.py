@@ -102,7 +102,7 @@ def test_surface_beyond_the_cylinder_ends_it(bounds: Cylinder, words: str) -> No
 def test_the_points_beyond_a_cylinder_that_is_too_small_are_kept() -> None:
     policy, held = surveyed(ball())
     returned = held.sweep(survey(scan(), BOUNDS, 25.0).path.T_WS)
-    beyond = returned._replace(points_W=returned.points_W + (60.0, 0.0, 0.0))
+    beyond = returned._replace(points_W=returned.points_W + np.array((60.0, 0.0, 0.0)))
     session = run_session(policy, held, 1, scan_path=lambda: beyond)
     assert session.contradicts
     assert "beside the bounding cylinder" in str(session.failure)
