@@ -8,15 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.adaptive.known_part import KnownPart
-from planner.adaptive.policy import Returned
+from planner.adaptive.policy import Policy, Returned
 from planner.adaptive.session import Session, run_session
 from planner.adaptive.surroundings import Surroundings
 from planner.adaptive.table_carrier import ScannedStrip, TableCarrier
 from planner.adaptive.transfer import Transfer
+from planner.adaptive.unknown_part import UnknownPart, survey
 from planner.adaptive.unseen_regions import Region, unseen_regions
 from planner.arrays import BoolArray, IndexArray
 from planner.cell.obstacles import workpiece_obstacle
 from planner.cell.scan import Scan
+from planner.cell.workpiece import Cylinder
 from planner.defaults import MOST_STRIPS, SHARE_SEEN
 from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.execution.run_input import RunInput
@@ -51,10 +53,12 @@ class AdaptOptions(NamedTuple):
     Attributes:
         share: Of what can be seen, that is wanted.
         most_strips: How many strips are scanned at most.
+        bounds: A cylinder that holds the part, in frame W: the strips are chosen without the mesh. None to use it.
     """
 
     share: float = SHARE_SEEN
     most_strips: int = MOST_STRIPS
+    bounds: Cylinder | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,8 +186,9 @@ def scan_adaptively(
     known = known or scan
     probe = probe_of(scan, options)
     knowledge = Knowledge.of(scan, probe, options.exact_calibration, options.seed)
-    policy = _policy(known, probe, options, adapt, progress)
-    path = planned_scan(scan, options.configuration, options.angle_count, progress) if scan.has_path else None
+    policy, surveyed = _policy(known, probe, options, adapt, progress)
+    to_plan = surveyed or scan
+    path = planned_scan(to_plan, options.configuration, options.angle_count, progress) if to_plan.has_path else None
     if path is not None:
         check_motion(path, options)
     else:
@@ -207,7 +212,7 @@ def scan_adaptively(
         scan, options, probe, path or carrier.scanned[0].plan.planned, knowledge, joined(cloud.runs), work,
         ply.count, _worst(cloud.dead_lines), is_whole, out,
     )  # fmt: skip
-    visible = policy.visible | (work.coverage.codes == Sight.SEEN)
+    visible = _visible(policy, known, probe, options, adapt, progress) | (work.coverage.codes == Sight.SEEN)
     regions = unseen_regions(work.coverage, visible, float(scan.mesh.area))
     return AdaptiveScanned(
         scanned, session, tuple(carrier.scanned), path, draws_back, adapt.share, visible, cloud.first_seen,
@@ -216,6 +221,28 @@ def scan_adaptively(
 
 
 def _policy(
+    known: Scan, probe: LaserProbe, options: ScanOptions, adapt: AdaptOptions, progress: ProgressOf
+) -> tuple[Policy, Scan | None]:
+    """Return the policy and, where it has no mesh, the scan of the bounding cylinder that comes first."""
+    if adapt.bounds is None:
+        return _known_part(known, probe, options, adapt, progress), None
+    speed_mm_s = _DENSITY * COVERED_MM * options.triggers.rate_hz
+    policy = UnknownPart(Surroundings.of(known), probe, adapt.bounds, speed_mm_s)
+    return policy, survey(known, adapt.bounds, speed_mm_s)
+
+
+def _visible(
+    policy: Policy, known: Scan, probe: LaserProbe, options: ScanOptions, adapt: AdaptOptions, progress: ProgressOf
+) -> BoolArray:
+    """Return which places can be seen; after a session without the mesh, only the report asks for it."""
+    if isinstance(policy, KnownPart):
+        return policy.visible
+    judge = _known_part(known, probe, options, adapt._replace(share=1.0), progress)
+    judge.next_strips()
+    return judge.visible
+
+
+def _known_part(
     known: Scan, probe: LaserProbe, options: ScanOptions, adapt: AdaptOptions, progress: ProgressOf
 ) -> KnownPart:
     solid = workpiece_obstacle(known, progress("distance field"))

@@ -19,9 +19,9 @@ from planner.adaptive.surroundings import Surroundings
 from planner.adaptive.visibility import sees
 from planner.adaptive.voxel_map import VoxelMap
 from planner.arrays import FloatArray, IndexArray
-from planner.cell.cell import Probe
 from planner.cell.obstacles import Obstacle
 from planner.cell.patterns import StripLayout, cylinder_rings
+from planner.cell.scan import Scan, check_it_fits_the_table
 from planner.cell.scan_path import ScanPath, at_scan_speed
 from planner.cell.workpiece import Cylinder
 from planner.geometry.box_distance import FIELD
@@ -33,9 +33,10 @@ _BEYOND_MM = 0.5
 """How far a point may lie beyond the bounding cylinder: noise, and errors of the alignment."""
 _SURVEY_GAP_MM = 25.0
 """How far the cylinder is beyond the beginning of the range in the survey."""
+_SURVEY_STEP_S = 0.5
 _TARGETS, _WAYS_EACH = 60, 8
 _ROLLS_DEG = (0.0, 90.0)
-_LENGTH_MM, _STEP_S = 60.0, 0.5
+_LENGTH_MM = 60.0
 _FEWEST_POSES = 3
 _BATCH = 4
 """Strips that are chosen at once."""
@@ -43,34 +44,43 @@ _TRIED_FIRST = 200
 """Candidates whose reach is looked for at once, those that are worth most first."""
 _LEAST_WORTH = 3.0
 """What a strip has to be worth, in guesses."""
-_MOST_TRIES = 30
+_KEPT, _MOST_TRIES = 0.5, 30
+"""What a guess keeps of its worth with each strip that should have seen it and did not."""
 
 
-def survey(bounds: Cylinder, probe: Probe, speed_mm_s: float, step_s: float) -> ScanPath:
-    """Return rings about a bounding cylinder, which the range of the probe reaches into as far as is safe.
+def survey(scan: Scan, bounds: Cylinder, speed_mm_s: float) -> Scan:
+    """Return the scan of a bounding cylinder instead of the part: rings, near enough to see far into it.
 
     Args:
-        bounds: The cylinder.
-        probe: What can be measured.
+        scan: The cell and its limits; its workpiece and its path are left out.
+        bounds: The cylinder, in frame W.
         speed_mm_s: How fast the laser line moves over the cylinder.
-        step_s: Time from one location to the next.
+
+    Raises:
+        WorkpieceError: The cylinder reaches beyond the table.
     """
-    near = replace(probe, stand_off_mm=probe.nearest_mm + _SURVEY_GAP_MM)
-    waypoints = cylinder_rings(bounds, near, StripLayout())
-    return at_scan_speed(waypoints, speed_mm_s, step_s, near.stand_off_mm, near.line_width_mm)
+    mesh = bounds.mesh()
+    check_it_fits_the_table(mesh, scan.cell)
+    probe = replace(scan.cell.probe, stand_off_mm=scan.cell.probe.nearest_mm + _SURVEY_GAP_MM)
+    waypoints = cylinder_rings(bounds, probe, StripLayout())
+    path = at_scan_speed(waypoints, speed_mm_s, _SURVEY_STEP_S, probe.stand_off_mm, probe.line_width_mm)
+    cell = replace(scan.cell, probe=probe)
+    return replace(scan, cell=cell, workpiece=bounds, mesh=mesh, mesh_file=None, predefined_path=path)
 
 
 class UnknownPart:
     """Chooses strips from what the probe returned alone."""
 
-    def __init__(self, surroundings: Surroundings, probe: LaserProbe, bounds: Cylinder) -> None:
+    def __init__(self, surroundings: Surroundings, probe: LaserProbe, bounds: Cylinder, speed_mm_s: float) -> None:
         """Begin with nothing seen inside the cylinder.
 
         Args:
             surroundings: The cell.
             probe: What can be measured.
             bounds: A cylinder in frame W that holds the part.
+            speed_mm_s: How fast strips are swept.
         """
+        self._step_s = _LENGTH_MM / (POSES - 1) / speed_mm_s
         self._surroundings, self._probe, self._bounds = surroundings, probe, bounds
         self._voxels = VoxelMap(bounds, _VOXEL_MM)
         self._cloud = ThinnedCloud(_CELL_MM)
@@ -131,7 +141,7 @@ class UnknownPart:
         cells, inside = self._voxels.cells(self._guesses.places.points)
         tries = np.zeros(len(cells), dtype=np.int64)
         tries[inside] = self._tries[tuple(cells[inside].T)]
-        return np.asarray(self._guesses.weights * 0.5**tries)
+        return np.asarray(self._guesses.weights * _KEPT**tries)
 
     def _candidates(self, weights: FloatArray) -> FloatArray:
         """Return strips `(n, k, 4, 4)` over the guesses that are worth most."""
@@ -152,7 +162,7 @@ class UnknownPart:
         """Return up to a batch of strips that the arm can sweep, each worth the most beside those before it."""
         n, k = candidates.shape[:2]
         poses = allowed(self._surroundings, self.solid(), candidates.reshape(-1, 4, 4))
-        turn = int(self._surroundings.limits.speed_deg_s * _STEP_S / (360.0 / ANGLES))
+        turn = int(self._surroundings.limits.speed_deg_s * self._step_s / (360.0 / ANGLES))
         found = reach(poses.reshape(len(poses), n, k, -1), turn)
         swept = trimmed(candidates, found)
         strips = [swept[number] for number in usable(found, _FEWEST_POSES)]
@@ -166,12 +176,12 @@ class UnknownPart:
             if worth[best] < _LEAST_WORTH:
                 break
             self._count += 1
-            chosen.append(Strip(f"strip {self._count}", ScanPath(strips[best], _STEP_S)))
+            chosen.append(Strip(f"strip {self._count}", ScanPath(strips[best], self._step_s)))
             left[seen[best]] = 0.0
         return chosen
 
     def _note(self, strip: Strip) -> None:
-        """Halve what the guesses are worth that a strip should have seen."""
+        """Lower what the guesses are worth that a strip should have seen."""
         last = np.array([len(strip.T_WS) - 1])
         seen = sees(self._estimate.caster, self._probe, strip.T_WS[np.newaxis], last, self._guesses.places)[0]
         cells, inside = self._voxels.cells(self._guesses.places.points[seen])

@@ -33,6 +33,7 @@ class VoxelMap:
 
     Attributes:
         states: `(nx, ny, nz)`, each UNKNOWN, FREE or SURFACE.
+        is_within: `(nx, ny, nz)`, which of them are in the cylinder.
         lower_mm: `(3,)` the corner of the first voxel.
         voxel_mm: Side of a voxel.
     """
@@ -53,6 +54,7 @@ class VoxelMap:
         # A voxel that the cylinder only touches counts as part of it.
         radial2 = np.maximum(across, 0.0)[:, np.newaxis] ** 2 + np.maximum(along, 0.0) ** 2
         inside = (radial2 < radius_mm**2)[:, :, np.newaxis] & (up < 0.5 * bounds.height_mm)
+        self.is_within: BoolArray = inside
         self.states: CodeArray = np.where(inside, UNKNOWN, FREE).astype(np.uint8)
 
     def take(self, origins: FloatArray, points: FloatArray) -> None:

@@ -202,6 +202,15 @@ def _add_adaptive(parser: argparse.ArgumentParser) -> None:
         "--most-strips", type=whole_number(1, 10_000), default=MOST_STRIPS, metavar="N",
         help="maximum number of adaptive strips (default: %(default)s)",
     )  # fmt: skip
+    parser.add_argument(
+        "--blind", type=positive_number, nargs=2, metavar=("DIAMETER", "HEIGHT"),
+        help="choose the strips without the mesh, inside an approximate cylinder about the z axis of the workpiece's"
+        " frame that holds the part, in mm",
+    )  # fmt: skip
+    parser.add_argument(
+        "--turn-over", action="store_true",
+        help="lay the part on another face afterwards, scan it again, and join both clouds (extra: adaptive)",
+    )  # fmt: skip
 
 
 def _add_show(commands: "argparse._SubParsersAction[Parser]") -> None:

@@ -3,10 +3,20 @@
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 from planner.adaptive.adaptive_report import adaptive_document, adaptive_report, adaptive_summary
 from planner.adaptive.adaptive_scan import AdaptOptions, scan_adaptively
+from planner.adaptive.turn_over import (
+    JOINED_FILE,
+    TURNED_FOLDER,
+    TurnedOver,
+    scan_turned_over,
+    turned_over_document,
+    turned_over_summary,
+)
 from planner.cell.scan import Scan, load_scan, with_mesh
+from planner.cell.workpiece import Cylinder
 from planner.commands import options
 from planner.defaults import SHARE_SEEN
 from planner.errors import PlannerError
@@ -18,11 +28,11 @@ from planner.set_aside import set_aside
 from protocol import TableError
 from protocol.extras import need
 from protocol.page import Origin
-from protocol.progress import progress_line, show_line
+from protocol.progress import Progress, progress_line, show_line
 from protocol.whole_file import write_whole
 
 _INCOMPLETE = 1
-SCAN_RESULTS = ("cloud.ply", "cloud.xyz", "normals.ply", "poses.csv", "scan.json", "report.html")
+SCAN_RESULTS = ("cloud.ply", "cloud.xyz", "normals.ply", "poses.csv", JOINED_FILE, "scan.json", "report.html")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -30,6 +40,11 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.surface is not None:
         need("gpytoolbox")
         _check_surface_file(arguments.surface)
+    if arguments.turn_over:
+        need("small_gicp")
+        if arguments.blind is not None:
+            raise PlannerError("--turn-over: the other face is chosen by the mesh; leave out --blind")
+        set_aside(arguments.out / TURNED_FOLDER, SCAN_RESULTS)
     set_aside(arguments.out, SCAN_RESULTS, keep=() if arguments.mesh is None else (arguments.mesh,))
     progress = progress_line("mesh", sys.stderr)
     scan = known = load_scan(arguments.scan, options.say, progress)
@@ -54,9 +69,9 @@ def run(arguments: argparse.Namespace) -> int:
     )
     out: Path = arguments.out
     try:
-        if arguments.adapt is not None or not scan.has_path:
+        if _is_adaptive(arguments) or not scan.has_path:
             return _adaptive(scan, known, asked, arguments)
-        scanned = scan_workpiece(scan, asked, out, lambda label: progress_line(label, sys.stderr))
+        scanned = scan_workpiece(scan, asked, out, _progress_of)
         save_scan(out / "scan.json", scan_document(scanned))
         write_whole(out / "report.html", scan_report(scanned, Origin(arguments.command_line)))
     except TableError as error:
@@ -70,21 +85,49 @@ def run(arguments: argparse.Namespace) -> int:
 def _adaptive(scan: Scan, known: Scan, asked: ScanOptions, arguments: argparse.Namespace) -> int:
     """Scan adaptively; `known` has the mesh that the strips are chosen by. Return the exit status."""
     out: Path = arguments.out
-    wanted = AdaptOptions(SHARE_SEEN if arguments.adapt is None else arguments.adapt, arguments.most_strips)
-    found = scan_adaptively(
-        scan, asked, wanted, out, lambda label: progress_line(label, sys.stderr), _show_strips, known
+    wanted = AdaptOptions(
+        share=SHARE_SEEN if arguments.adapt is None else arguments.adapt,
+        most_strips=arguments.most_strips,
+        bounds=None if arguments.blind is None else Cylinder(*arguments.blind),
     )
+    found = scan_adaptively(scan, asked, wanted, out, _progress_of, _show_strips, known)
     show_line("", sys.stderr)
-    save_scan(out / "scan.json", scan_document(found.scanned) | {"adaptive": adaptive_document(found)})
+    document = scan_document(found.scanned) | {"adaptive": adaptive_document(found)}
+    save_scan(out / "scan.json", document)
     write_whole(out / "report.html", adaptive_report(found, Origin(arguments.command_line)))
     sys.stdout.write(summary(found.scanned) + adaptive_summary(found))
+    is_joined = True
+    if arguments.turn_over and found.session.failure is None:
+        turned = scan_turned_over(found, scan, asked, wanted, out, _progress_of, _show_strips)
+        is_joined = _write_turned_over(turned, document, arguments)
     if found.session.contradicts:
         raise PlannerError(f"{found.session.failure}; what was scanned is in {out}")
-    return 0 if found.has_succeeded else _INCOMPLETE
+    return 0 if found.has_succeeded and is_joined else _INCOMPLETE
+
+
+def _write_turned_over(turned: TurnedOver, document: dict[str, Any], arguments: argparse.Namespace) -> bool:
+    """Write and print what the second placement came to, and return whether the clouds were joined."""
+    out: Path = arguments.out
+    show_line("", sys.stderr)
+    second = out / TURNED_FOLDER
+    adaptive = adaptive_document(turned.second)
+    save_scan(second / "scan.json", scan_document(turned.second.scanned) | {"adaptive": adaptive})
+    write_whole(second / "report.html", adaptive_report(turned.second, Origin(arguments.command_line)))
+    save_scan(out / "scan.json", document | {"turned_over": turned_over_document(turned)})
+    sys.stdout.write(turned_over_summary(turned))
+    return not isinstance(turned.joined, str)
+
+
+def _progress_of(label: str) -> Progress | None:
+    return progress_line(label, sys.stderr)
 
 
 def _show_strips(number: int, state: str) -> None:
     show_line(f"strip {number}: {state}", sys.stderr)
+
+
+def _is_adaptive(arguments: argparse.Namespace) -> bool:
+    return arguments.adapt is not None or arguments.blind is not None or arguments.turn_over
 
 
 def _check_surface_file(file: Path) -> None:

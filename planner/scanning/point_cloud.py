@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
+from plyfile import PlyData
 
 from planner.arrays import FloatArray, IndexArray
 from protocol.whole_file import whole_file
@@ -66,6 +67,13 @@ class PlyWriter:
         self._file.write(self._header())
         self._file.close()
         self._stack.close()
+
+
+def read_cloud(file: Path) -> tuple[FloatArray, FloatArray]:
+    """Return the points `(n, 3)` in mm and the directions of the laser `(n, 3)` of a file that `PlyWriter` wrote."""
+    vertices = PlyData.read(str(file))["vertex"].data
+    columns = np.column_stack([np.asarray(vertices[name], dtype=np.float64) for name in _COORDINATES])
+    return columns[:, :3], columns[:, 3:]
 
 
 def write_normals(file: Path, points: FloatArray, normals: FloatArray, comment: str = "") -> None:

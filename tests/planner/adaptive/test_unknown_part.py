@@ -48,8 +48,8 @@ def ball() -> trimesh.Trimesh:
 def surveyed(mesh: trimesh.Trimesh) -> tuple[UnknownPart, HandHeldProbe]:
     """Return the policy and the probe after the survey."""
     surroundings = Surroundings.of(scan())
-    policy, held = UnknownPart(surroundings, optics(), BOUNDS), HandHeldProbe(mesh, optics())
-    policy.take(None, held.sweep(survey(BOUNDS, surroundings.cell.probe, 25.0, 0.5).T_WS))
+    policy, held = UnknownPart(surroundings, optics(), BOUNDS, 30.0), HandHeldProbe(mesh, optics())
+    policy.take(None, held.sweep(survey(scan(), BOUNDS, 25.0).path.T_WS))
     return policy, held
 
 
@@ -93,15 +93,24 @@ def test_no_strip_is_asked_for_twice() -> None:
     ],
 )
 def test_surface_beyond_the_cylinder_ends_it(bounds: Cylinder, words: str) -> None:
-    narrow = UnknownPart(Surroundings.of(scan()), optics(), bounds)
-    seen = HandHeldProbe(cup(), optics()).sweep(survey(BOUNDS, scan().cell.probe, 25.0, 0.5).T_WS)
+    narrow = UnknownPart(Surroundings.of(scan()), optics(), bounds, 30.0)
+    seen = HandHeldProbe(cup(), optics()).sweep(survey(scan(), BOUNDS, 25.0).path.T_WS)
     with pytest.raises(PolicyError, match=words):
         narrow.take(None, seen)
 
 
+def test_the_points_beyond_a_cylinder_that_is_too_small_are_kept() -> None:
+    policy, held = surveyed(ball())
+    returned = held.sweep(survey(scan(), BOUNDS, 25.0).path.T_WS)
+    beyond = returned._replace(points_W=returned.points_W + np.array((60.0, 0.0, 0.0)))
+    session = run_session(policy, held, 1, scan_path=lambda: beyond)
+    assert session.contradicts
+    assert "beside the bounding cylinder" in str(session.failure)
+
+
 def test_it_is_a_policy_that_is_given_no_mesh() -> None:
     policy: Policy = surveyed(ball())[0]
-    assert list(inspect.signature(UnknownPart).parameters) == ["surroundings", "probe", "bounds"]
+    assert list(inspect.signature(UnknownPart).parameters) == ["surroundings", "probe", "bounds", "speed_mm_s"]
     assert not {"mesh", "workpiece", "mesh_file", "path"} & set(Surroundings.__dataclass_fields__)
     assert policy.next_strips()
 

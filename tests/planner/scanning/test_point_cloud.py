@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from planner.scanning.point_cloud import PlyWriter, XyzWriter, write_normals
+from planner.scanning.point_cloud import PlyWriter, XyzWriter, read_cloud, write_normals
 
 POINTS = np.random.default_rng(0).uniform(-300.0, 300.0, (1000, 3))
 BEAMS = POINTS / np.linalg.norm(POINTS, axis=1, keepdims=True)
@@ -40,6 +40,13 @@ def test_beams_and_profiles_are_beside_the_points(tmp_path: Path) -> None:
     assert len(rows) == 1000
     assert np.abs(np.column_stack([rows[f"beam_{axis}"] for axis in "xyz"]) - BEAMS).max() < 1e-6
     assert (rows["profile"] == NUMBERS).all()
+
+
+def test_a_cloud_is_read_back(tmp_path: Path) -> None:
+    write(tmp_path / "cloud.ply", 300)
+    points, beams = read_cloud(tmp_path / "cloud.ply")
+    assert np.abs(points - POINTS).max() < 2e-5
+    assert np.abs(beams - BEAMS).max() < 1e-6
 
 
 def test_the_blocks_leave_no_trace(tmp_path: Path) -> None:
