@@ -62,8 +62,8 @@ def adaptive_report(scanned: AdaptiveScanned, origin: Origin | None = None) -> s
             words=True,
         ),
         paragraph(
-            "The way to a strip: the probe retracts along its beam, the arm moves while the table turns, or waits clear"
-            " of the part until it has turned, and the probe approaches. Joint limits, joint speeds and collisions are"
+            "On the way to a strip, the probe retracts along its beam, the arm moves, and the probe approaches. The table"
+            " turns while the arm moves, or while it waits clear of the part. Joint limits, joint speeds and collisions are"
             " checked everywhere along it. The arm is taken to use half of its joint speeds."
         ),
         *_refused(scanned),
@@ -131,7 +131,7 @@ def _regions(scanned: AdaptiveScanned) -> Iterator[tuple[Cell, ...]]:
 
 
 def adaptive_document(scanned: AdaptiveScanned) -> dict[str, Any]:
-    """Return what `scan.json` tells of the strips; lengths in mm, areas in mm2, angles in deg, times in s."""
+    """Return the strips as part of `scan.json`; lengths in mm, areas in mm2, angles in deg, times in s."""
     return {
         "wanted": scanned.wanted,
         "seen_of_visible": scanned.share_of_visible,

@@ -43,7 +43,7 @@ from planner.scanning.scan_run import (
 )
 from protocol.progress import ProgressOf
 
-# Profiles of a strip are this share of the greatest distance without a gap apart, so that one may be missing.
+# Distance of a strip's profiles, as a share of the largest distance without a gap: one profile may be missing.
 _DENSITY = 0.4
 
 
@@ -254,7 +254,7 @@ def _known_part(
 
 
 def _worst(dead_lines: list[DeadLine]) -> DeadLine:
-    """Return what would have happened if the line had died in any of several motions."""
+    """Return the consequences if the line had failed in any of several motions."""
     crossing = [each for each in dead_lines if each.first_s is not None]
     return DeadLine(
         max(each.longest_deg for each in dead_lines),

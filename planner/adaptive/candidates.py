@@ -97,8 +97,8 @@ def along_mm(length_mm: float) -> FloatArray:
 def following(caster: RayCaster, strips: FloatArray, probe: Probe) -> tuple[FloatArray, BoolArray]:
     """Return strips moved along their beams so that the stand-off is kept, and which of them moved by much, `(n,)`.
 
-    Each pose keeps the stand-off from the nearest of what its laser line meets within the range, but comes no faster
-    nearer than the surface's slope may be: so a strip over a hollow stays over its rim.
+    Each pose keeps the stand-off from the nearest surface that its laser line meets within the range. The slope of a
+    strip is limited, so that over a hollow it stays above the rim.
     """
     n, k = strips.shape[:2]
     across = np.linspace(-0.3, 0.3, 5)[:, np.newaxis] * probe.line_width_mm
@@ -136,7 +136,7 @@ def candidate_sweeps(
         most_directions: From how many directions each is looked at; those that are reached are spread.
         longest_mm: The part's longest side, which strips are half as long as.
         probe: The probe.
-        is_reached: Tells for poses `(m, 4, 4)` which of them the arm can reach at any table angle, `(m,)`.
+        is_reached: Returns for poses `(m, 4, 4)` which the arm can reach at any table angle, `(m,)`.
     """
     chosen = places.only(spread(places.points, targets))
     number, ways = directions(caster, chosen, probe.stand_off_mm)

@@ -1,7 +1,7 @@
 """Choose the fewest strips that see a wanted share of a surface: partial set cover.
 
 Lazy greedy (Minoux, 1978): each time the strip that adds most; what a strip adds can only become less, so old figures
-are bounds and few need to be computed anew. Greedy is within ln n of the best. An exchange then improves on it: strips
+are bounds and few need to be computed again. Greedy is within ln n of the best. An exchange then improves on it: strips
 that are not needed are given up, two are replaced by one, and one by another that sees more, until nothing helps.
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from planner.arrays import BoolArray, IndexArray
+from planner.arrays import BoolArray
 
 _Table = npt.NDArray[np.float32]
 # Rounds of exchange: each gives up a strip or sees more places, so this is never met in practice.
@@ -19,7 +19,7 @@ _MOST_ROUNDS = 1000
 
 
 def choose(sees: BoolArray, seen: BoolArray, wanted: int, most: int) -> list[int]:
-    """Return the numbers of few strips that together see at least `wanted` places, the most useful first.
+    """Return the numbers of few strips that together see at least `wanted` places, best first.
 
     Where that is not possible, or `most` strips are too few, the strips that see most.
 
@@ -37,7 +37,7 @@ def choose(sees: BoolArray, seen: BoolArray, wanted: int, most: int) -> list[int
 
 
 def lazy_greedy(sees: BoolArray, wanted: int, most: int) -> list[int]:
-    """Return strips, each of which adds the most to those before it, until `wanted` places are seen."""
+    """Return strips until `wanted` places are seen; each is the one that adds most to those before it."""
     covered = np.zeros(sees.shape[1], dtype=np.bool_)
     bounds = [(-int(gain), number) for number, gain in enumerate(sees.sum(axis=1))]
     heapq.heapify(bounds)
@@ -104,11 +104,6 @@ def _one_for_one(table: _Table, chosen: list[int]) -> list[int] | None:
 
 
 def by_gain(sees: BoolArray, chosen: Sequence[int]) -> list[int]:
-    """Return the strips ordered so that each adds the most to those before it."""
+    """Return the strips in the order in which each adds most to those before it."""
     order = lazy_greedy(sees[np.asarray(chosen, dtype=np.int64)], sees.shape[1], len(chosen))
     return [chosen[number] for number in order]
-
-
-def share_seen(sees: BoolArray, chosen: Sequence[int] | IndexArray) -> float:
-    """Return the share of the places that strips see together."""
-    return float(sees[np.asarray(chosen, dtype=np.int64)].any(axis=0).mean())

@@ -1,4 +1,4 @@
-"""The order of strips that takes the least time: an open tour in which each strip may be swept from either end.
+"""The order of strips with the shortest time: an open tour in which each strip may be swept from either end.
 
 From the end of one strip to the beginning of the next, the slower of table and arm decides. The tour begins at a
 strip near the start and goes on to the nearest; then parts of it are reversed (2-opt) or moved (Or-opt) while

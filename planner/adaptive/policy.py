@@ -1,4 +1,4 @@
-"""What chooses the strips of a session: a policy, which knows only what it was made with and what the probe returned.
+"""What chooses the strips of a session: a policy, which has only what it was made with and what the probe returned.
 
 A session repeats: ask the policy for strips, plan and scan them one after the other, hand back what the probe returned.
 Everything that a policy decides about the workpiece is its own: with a mesh (`planner.adaptive.known_part`), or from
@@ -38,7 +38,7 @@ class Policy(Protocol):
     def next_strips(self) -> Sequence[Strip]:
         """Return strips to scan next, best first; none when nothing more is worth a strip.
 
-        The session scans a batch in the order that takes the least time, then asks again.
+        The session scans a batch in the order with the shortest time, then asks again.
         """
         ...
 

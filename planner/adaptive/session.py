@@ -49,7 +49,7 @@ class Session(NamedTuple):
 
     Attributes:
         steps: Its strips, in the order in which they were scanned.
-        failure: Why it ended early; None when the policy wanted no more strips, or the most were scanned.
+        failure: Why it ended early; None when the policy wanted no more strips, or the maximum number was scanned.
         contradicts: Whether it ended because what was seen contradicts what the policy was made with.
     """
 

@@ -1,4 +1,4 @@
-"""What planning a strip needs to know: the cell and its limits, and what counts as solid. A mesh is not among it."""
+"""What planning a strip needs: the cell and its limits, and what counts as solid. No mesh is part of it."""
 
 from dataclasses import dataclass
 

@@ -162,7 +162,7 @@ class TableCarrier:
         self._stance, self._table_deg = stance, stance.table_deg
 
     def _ways(self, solid: Obstacle) -> Transfers:
-        """Return the ways past something solid; looked for anew when it has changed."""
+        """Return the ways past something solid; searched again when it has changed."""
         if self._transfers is None or self._transfers[0] is not solid:
             cell, value = self._surroundings.cell, self._surroundings.value
             minimum_mm = _CLEARANCE_SHARE * value.minimum_clearance_mm

@@ -29,7 +29,7 @@ def scan_report(scanned: Scanned, origin: Origin | None = None) -> str:
 
 
 def scan_blocks(scanned: Scanned) -> tuple[str, ...]:
-    """Return the parts of the page that tell of the cloud, its errors, coverage, calibration and profiles."""
+    """Return the parts of the page on the cloud, its errors, coverage, calibration and profiles."""
     mesh, budget = scanned.scan.mesh, scanned.budget
     return (
         heading("The cloud"),

@@ -114,7 +114,7 @@ class Scanned:
     Attributes:
         planned: The motion, the first one of several.
         run: What was latched, in all motions together.
-        dead_line: How far the table would have run on if the line had died, and into what.
+        dead_line: the consequences if the line had failed.
     """
 
     scan: Scan

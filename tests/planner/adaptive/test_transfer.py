@@ -121,7 +121,7 @@ def test_a_way_leads_from_one_stance_to_the_other_and_is_free(
 
 
 def clearance_along_mm(way: Transfer, start: Stance | None, end: Stance | None) -> float:
-    """The least clearance along a way, with the table where it may be, by dense samples."""
+    """The minimum clearance along a way, with the table where it may be, by dense samples."""
     check = check_of(PART)
     angles = [each.table_deg for each in (start, end) if each is not None]
     least = np.inf
