@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 from planner.adaptive.adaptive_scan import AdaptiveScanned
 from planner.arrays import FloatArray
 from planner.geometry.ray_casting import RayCaster
-from planner.plot_style import BLUE, GRAY, GREEN, INK, LIMIT, PALE, VERMILION, new_figure, styled
+from planner.plot_style import BLUE, GREEN, INK, LIMIT, PALE, SKY, VERMILION, new_figure, styled
 from planner.scanning.part_view import View, painted
 
 _AZIMUTHS_DEG = (-60.0, 30.0, 120.0, 210.0)
@@ -70,7 +70,7 @@ def _colors(scanned: AdaptiveScanned) -> FloatArray:
     colors = np.where(scanned.visible[:, np.newaxis], to_rgb(VERMILION), to_rgb(PALE))
     seen = scanned.first_seen >= first
     colors[seen] = steps[scanned.first_seen[seen] - first]
-    colors[(scanned.first_seen >= 0) & ~seen] = to_rgb(GRAY)
+    colors[(scanned.first_seen >= 0) & ~seen] = to_rgb(SKY)
     return np.asarray(colors)
 
 
@@ -105,7 +105,7 @@ def coverage_steps_figure(scanned: AdaptiveScanned) -> Figure:
     shares = np.array(scanned.seen_after) / max(1, int(scanned.visible.sum()))
     first = int(scanned.path is None)
     numbers = np.arange(first, first + len(shares))
-    axes.bar(numbers, shares, color=[GRAY if scanned.path is not None and n == 0 else BLUE for n in numbers], width=0.7)
+    axes.bar(numbers, shares, color=[SKY if scanned.path is not None and n == 0 else BLUE for n in numbers], width=0.7)
     axes.axhline(scanned.wanted, **LIMIT)
     axes.annotate(f"wanted {scanned.wanted:.1%}", (numbers[0] - 0.4, scanned.wanted), va="bottom", color=GREEN)
     axes.set_ylim(0.0, 1.08)

@@ -56,15 +56,14 @@ def adaptive_report(scanned: AdaptiveScanned, origin: Origin | None = None) -> s
             f"Coverage strip by strip: {scanned.share_of_visible:.1%} of what can be seen in the end.",
         ),
         table(
-            ("strip", "seen of what can be seen", "seen of the whole", "table (deg)", "way to it (s)", "motion (s)",
-             "arm", "motion verified"),
+            ("strip", "of what can be seen", "of the whole", "table (deg)", "way to it (s)", "motion (s)", "off plan at most"),
             list(_strips(scanned)),
             words=True,
         ),
         paragraph(
-            "On the way to a strip, the probe retracts along its beam, the arm moves, and the probe approaches. The table"
-            " turns while the arm moves, or while it waits clear of the part. Joint limits, joint speeds and collisions are"
-            " checked everywhere along it. The arm is taken to use half of its joint speeds."
+            "On the way to a strip, the probe retracts along its beam, the arm moves, and the probe approaches."
+            " The table turns while the arm moves, or while it waits clear of the part. Joint limits, joint speeds and"
+            " collisions are checked everywhere along it. The arm is taken to use half of its joint speeds."
         ),
         *_refused(scanned),
         heading("What stays unseen"),
@@ -104,7 +103,7 @@ def _strips(scanned: AdaptiveScanned) -> Iterator[tuple[Cell, ...]]:
         yield (
             str(number), *share, f"{plan.angles_deg[0]:.0f} to {plan.angles_deg[-1]:.0f}",
             f"{strip.transfer.duration_s:.1f}", f"{strip.duration_s - strip.transfer.duration_s:.1f}",
-            plan.configuration, held,
+            held,
         )  # fmt: skip
 
 

@@ -1,8 +1,8 @@
 """Which strips the arm can sweep: at which table angle, in which configuration, and how far along each.
 
-A pose is allowed where the configuration map allows it (reach, joint limits, singularities, collisions). A strip is swept
-in one configuration while the table stands or turns slowly: from one pose to the next it may go as far as the table
-can turn in that time, over allowed angles.
+A pose is allowed where the configuration map allows it (reach, joint limits, singularities, collisions). A strip is
+swept in one configuration while the table stands or turns slowly: from one pose to the next it may go as far as the
+table can turn in that time, over allowed angles.
 """
 
 from collections.abc import Sequence
