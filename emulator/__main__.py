@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import os
 import socket
 import sys
 from collections.abc import Iterator
@@ -19,11 +18,11 @@ from emulator.server.server import SERVED_SIGNALS, Server
 from emulator.server.signals import SignalWatch
 from emulator.table.table import Table
 from emulator.trace import TraceError, TraceWriter
-from protocol.command_line import Parser, program_name
+from protocol.command_line import Parser, program_name, report, report_error
 from protocol.data_file import shown
 
 _EXAMPLE = """example:
-  python -m emulator --pty --link ./table &
+  {table} --pty --link ./table &
   picocom -b 9600 --echo --imap crcrlf ./table     (or: python -m serial.tools.miniterm --eol CR ./table 9600)
 
 The first line on stdout is the port that a client opens: the device, or a URL for pyserial. SIGUSR1 is the probe's
@@ -51,17 +50,13 @@ def main(arguments: list[str] | None = None) -> int:
         with ExitStack() as stack:
             _serve(options, config, stack)
     except (UsageError, ConfigError) as error:
-        _say(str(error))
-        return 2
+        return _refuse(str(error))
     except TraceError as error:
-        _say(f"--trace {error}")
-        return 2
+        return _refuse(f"--trace {error}")
     except ChipError as error:
-        _say(f"--firmware: {error}")
-        return 2
+        return _refuse(f"--firmware: {error}")
     except OSError as error:
-        _say(f"cannot continue: {error}; check that stdout is read")
-        return 2
+        return _refuse(f"cannot continue: {error}; check that stdout is read")
     return 0
 
 
@@ -79,7 +74,7 @@ def parser() -> Parser:
     parser = Parser(
         prog=program_name("emulator"),
         description="A rotary table's emulator behind a virtual serial port.",
-        epilog=_EXAMPLE,
+        epilog=_EXAMPLE.format(table=program_name("emulator")),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument
@@ -98,7 +93,12 @@ def parser() -> Parser:
         help="compiled firmware in simavr: avr builds it, or an .elf file (default: the emulator's own)",
     )
     add("--trigger-hz", metavar="F", type=_rate, default=0.0, help="rate of the probe's trigger (default: 0, none)")
-    add("--control", metavar="PATH", type=Path, help="path of the Unix socket for python -m emulator.control_client")
+    add(
+        "--control",
+        metavar="PATH",
+        type=Path,
+        help=f"path of the Unix socket for {program_name('emulator.control_client')}",
+    )
     add("--trace", metavar="FILE", type=Path, help="record every tick in a .csv or .npz file")
     add("--seed", metavar="N", type=_seed, default=0, help="random seed (default: 0)")
     return parser
@@ -236,11 +236,12 @@ def _usage(option: str) -> Iterator[None]:
 
 
 def _say(sentence: str) -> None:
-    try:
-        print(f"emulator: {sentence}", file=sys.stderr, flush=True)
-    except OSError:  # Nobody reads stdout any more. The rest of the buffer would fail again when Python exits.
-        with Path(os.devnull).open("w") as nobody:
-            os.dup2(nobody.fileno(), sys.stderr.fileno())
+    report(program_name("emulator"), sentence)
+
+
+def _refuse(problem: str) -> int:
+    report_error(program_name("emulator"), problem)
+    return 2
 
 
 if __name__ == "__main__":

@@ -13,17 +13,18 @@ from protocol.ending import ended
 
 __all__ = ["main", "request"]
 
+_MODULE = "emulator.control_client"
 _EXAMPLE = """example:
-  python -m emulator --pty --control table.control
-  python -m emulator.control_client table.control trigger
-  python -m emulator.control_client table.control load-torque 0.3
+  {table} --pty --control table.control
+  {control} table.control trigger
+  {control} table.control load-torque 0.3
 """
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     parsed = parser().parse_args(arguments)
-    return ended("control_client", lambda: _request(parsed), BenchError)
+    return ended(program_name(_MODULE), lambda: _request(parsed), BenchError)
 
 
 def _request(parsed: argparse.Namespace) -> int:
@@ -38,9 +39,9 @@ def _request(parsed: argparse.Namespace) -> int:
 def parser() -> Parser:
     """Return the parser of the command line."""
     parser = Parser(
-        prog=program_name("emulator.control_client"),
+        prog=program_name(_MODULE),
         description="Control a running emulator.",
-        epilog=_EXAMPLE,
+        epilog=_EXAMPLE.format(table=program_name("emulator"), control=program_name(_MODULE)),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("path", metavar="PATH", type=Path, help="the socket of the emulator's option --control")

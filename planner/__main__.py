@@ -8,7 +8,7 @@ from importlib import import_module
 from planner.commands.command_line import parser
 from planner.errors import PlannerError
 from planner.kinematics.configuration import Configuration
-from protocol.command_line import program_name, short_name
+from protocol.command_line import program_name
 from protocol.ending import ended
 
 
@@ -18,7 +18,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0; 1 for a negative verdict; 2 for input that cannot be used; 128 and the number of the signal that ended it.
     """
     chosen = parser().read(arguments)
-    name = short_name(f"{program_name('planner')} {chosen.command}")
+    name = f"{program_name('planner')} {chosen.command}"
     return ended(name, lambda: _status_of(chosen), PlannerError, interrupted="interrupted; nothing more was written")
 
 

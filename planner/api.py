@@ -104,7 +104,7 @@ def tracker(
     view: int = 50,
     wire: Wire | None = None,
 ) -> Tracker:
-    """Return a tracker of a scan whose locations become known while the table moves; it knows none yet.
+    """Return a tracker of a scan whose locations become known while the table moves; none is known yet.
 
     Args:
         scan: the cell, the limits, the weights and the time step; its path is not used.

@@ -49,6 +49,9 @@ SHARE_SEEN = 0.99
 MOST_STRIPS = 200
 """How many strips an adaptive scan has at most."""
 
+REPORT_FILE = "report.html"
+"""The name of the page in a folder of results."""
+
 
 def shipped_scans() -> list[str]:
     """Return the names of the shipped scans."""

@@ -107,6 +107,8 @@ class ControlChannel:
 
 def _exchange(path: Path, line: bytes, timeout_s: float) -> bytes:
     """Send a line, and return the reply up to its line feed, or the part that was received."""
+    if not hasattr(socket, "AF_UNIX"):
+        raise OSError("this system has no Unix sockets, so no control channel")
     clock, answer = WallClock(), b""
     deadline_s = clock.now_s() + timeout_s
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:

@@ -2,10 +2,13 @@
 
 import difflib
 import json
+import logging
 import tomllib
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
+
+_log = logging.getLogger(__name__)
 
 _MB = 1024 * 1024
 _LARGEST_BYTES = 256 * _MB
@@ -30,6 +33,7 @@ def read_text(path: Path, largest_bytes: int = _LARGEST_BYTES) -> str:
             data = file.read(largest_bytes + 1)
         if len(data) > largest_bytes:
             raise DataFileError(f"{path}: is larger than {largest_bytes // _MB} MB; is this the right file?")
+        _log.debug("read %s, %d bytes", path, len(data))
         return data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         if isinstance(error, DataFileError):

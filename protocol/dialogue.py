@@ -1,5 +1,6 @@
 """Commands and replies over a port, and resynchronization when a reply is missing."""
 
+import logging
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -11,6 +12,8 @@ from protocol.line_buffer import LineBuffer
 from protocol.messages import LINE_LIMIT, VERBS, Angle, Command, ErrorCode, Ok, Refusal, Reply, Verb
 from protocol.port import Port
 from protocol.predicted_reference import PredictedReference
+
+_log = logging.getLogger(__name__)
 
 # An incomplete command at the table must not be executed when the next CR arrives. CAN (0x18) is not a printable byte,
 # so it invalidates that line.
@@ -217,6 +220,7 @@ class Dialogue:
                 )
             self._arrived.extend(self._lines.feed(data))
         line = self._arrived.popleft()
+        _log.debug("received %r", line)
         self._reply_bytes = 1 + (len(line) if isinstance(line, bytes) else 0)
         self._last_line = f"a faulty line ({line.text})" if isinstance(line, ErrorCode) else repr(line)
         if isinstance(line, bytes):
@@ -251,6 +255,7 @@ class Dialogue:
     def _write(self, data: bytes) -> None:
         self._line_free_s = self._passed_s(data)
         is_fresh, self._may_hold_half_line = self._may_hold_half_line, True  # if an interrupt occurs during the write
+        _log.debug("sent %r", data)
         try:
             self._port.write(data)
         except OSError as error:

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 
+from protocol.command_line import report_error
 from protocol.interrupts import ended_by_signals, said, status_after
 
 _BAD_INPUT = 2
@@ -14,7 +15,7 @@ def ended(name: str, work: Callable[[], int], *expected: type[Exception], interr
     """Run a command and return its exit status. Expected errors, including those of files, are one line and status 2.
 
     Args:
-        name: name of the command, at the start of that line.
+        name: what the user typed for the program; that line starts with it, see `report_error`.
         work: returns the exit status.
         expected: the errors with a message for the user.
         interrupted: text of the line after a signal.
@@ -25,27 +26,19 @@ def ended(name: str, work: Callable[[], int], *expected: type[Exception], interr
         if sys.stdout is not None:
             sys.stdout.flush()
     except KeyboardInterrupt as interrupt:
-        say(name, said(interrupt, interrupted))
+        report_error(name, said(interrupt, interrupted))
         return status_after(interrupt)
     except BrokenPipeError:
         give_up_stdout()
-        say(name, "stdout is closed")
+        report_error(name, "stdout is closed")
         return _BAD_INPUT
     except Exception as error:
         if not isinstance(error, (*expected, OSError)):
             raise
         give_up_stdout()
-        say(name, said(error))
+        report_error(name, said(error))
         return ending.status(_BAD_INPUT)
     return ending.status(status)
-
-
-def say(name: str, sentence: str) -> None:
-    """Write a line of the command `name` to the terminal, if there is one."""
-    if sys.stderr is not None:
-        with suppress(OSError):
-            sys.stderr.write(f"{name}: {sentence}\n")
-            sys.stderr.flush()
 
 
 def give_up_stdout() -> None:

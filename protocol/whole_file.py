@@ -1,10 +1,13 @@
 """A file that other programs may wait for: it appears when it is complete, or not at all."""
 
+import logging
 import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+_log = logging.getLogger(__name__)
 
 
 @contextmanager
@@ -20,6 +23,7 @@ def whole_file(file: Path) -> Iterator[Path]:
     try:
         yield partial
         partial.replace(file)
+        _log.debug("wrote %s", file)
     finally:
         partial.unlink(missing_ok=True)
 

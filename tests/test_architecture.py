@@ -78,6 +78,8 @@ EDGE_MODULES = {
 
 PROTOCOL_EDGE = {
     "protocol/clock.py": {"time"},
+    "protocol/color.py": {"os"},
+    "protocol/command_line.py": {"os", "pathlib"},
     "protocol/control_channel.py": {"pathlib", "socket"},
     "protocol/interrupts.py": {"signal", "threading"},
     "protocol/ending.py": {"os"},

@@ -15,12 +15,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from planner.__main__ import main as planner
+from planner.defaults import REPORT_FILE
 from protocol import TableError
 from protocol.command_line import Parser, program_name
 from protocol.ending import ended
 
 SCAN = "cylinder"
-TIME_SCALE = 1.5
+TIME_SCALE = 3.0
 """Time scale of the emulator, so that a scan of 47 s is short."""
 LEAD_S = 0.0035
 """Lag of the emulator's encoder behind its reference."""
@@ -28,15 +29,22 @@ LEAD_S = 0.0035
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demonstration and return the exit status: 0 when the motion was verified."""
+    options = parser().parse_args(arguments)
+    return ended(program_name("tools.demo"), lambda: _run(options), TableError)
+
+
+def parser() -> Parser:
+    """Return the parser of the command line."""
     parser = Parser(
         prog=program_name("tools.demo"),
         description="Plan a scan, stream it to an emulator on a pseudo-terminal, and verify the motion.",
-        epilog="example: python -m tools.demo --out build/demo",
+        epilog=f"example: {program_name('tools.demo')} --out build/demo",
     )
-    parser.add_argument("job", choices=("scan", "preemption"), nargs="?", default="scan", help="default: scan")
+    parser.add_argument(
+        "job", choices=("scan", "preemption"), nargs="?", default="scan", help="what is shown (default: scan)"
+    )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="output folder")
-    options = parser.parse_args(arguments)
-    return ended("demo", lambda: _run(options), TableError)
+    return parser
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -65,7 +73,9 @@ def scan_on_a_pty(out: Path) -> int:
             command += ["--time-scale", f"{TIME_SCALE:g}", "--lead", f"{LEAD_S:g}", "--out", str(out / "run")]
             _say(f"python -m planner {' '.join(command)}")
             status = planner(command)
-    return planner(["show", str(out / "run")]) or status
+    if (page := out / "run" / REPORT_FILE).is_file():
+        print(page)
+    return status
 
 
 def _say(sentence: str) -> None:

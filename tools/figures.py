@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from protocol.command_line import Parser, program_name
+from protocol.data_file import did_you_mean
 from protocol.ending import ended
 
 NAMES = ("fig5", "fig6", "fig7", "fig8", "fig9")
@@ -21,21 +22,26 @@ NAMES = ("fig5", "fig6", "fig7", "fig8", "fig9")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the requested figures and print the names of the files."""
+    asked = parser()
+    options = asked.parse_args(arguments)
+    unknown = [name for name in options.names if name not in NAMES]
+    if unknown:
+        asked.error(f"NAME: is {unknown[0]}; allowed are {', '.join(NAMES)}{did_you_mean(unknown[0], NAMES)}")
+    return ended(program_name("tools.figures"), lambda: _draw(options))
+
+
+def parser() -> Parser:
+    """Return the parser of the command line."""
     parser = Parser(
         prog=program_name("tools.figures"),
         description="Reproduce Fig. 5 to 9 of the paper.",
-        epilog="example: python -m tools.figures --out build/figures fig8",
+        epilog=f"example: {program_name('tools.figures')} --out build/figures fig8",
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"which figures (default: {' '.join(NAMES)})")
     parser.add_argument(
         "--out", type=Path, default=Path("figures"), metavar="DIR", help="output folder (default: figures)"
     )
-    options = parser.parse_args(arguments)
-    unknown = [name for name in options.names if name not in NAMES]
-    if unknown:
-        print(f"there is no figure {unknown[0]!r}; allowed are {', '.join(NAMES)}", file=sys.stderr)
-        return 2
-    return ended("figures", lambda: _draw(options))
+    return parser
 
 
 def _draw(options: argparse.Namespace) -> int:

@@ -59,7 +59,10 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def figures(config: TableConfig, elf: Path) -> list[str]:
-    """Return the size of a firmware, and its longest tick at the most edges a second both ways, with a busy line."""
+    """Return the size of a firmware, and its longest tick with a busy line.
+
+    The rate of the edges is the maximum, in both directions.
+    """
     flash, ram = sizes(elf)
     tick_cycles = CLOCK_HZ // config.control.tick_hz
     chip = run_edges(config, _TICKS, firmware=elf)

@@ -1,8 +1,4 @@
-"""Identify a table: record a suitable motion over a port, and estimate the constants from a recording.
-
-python -m tools.identify record --port emulator:// --out trace.csv
-python -m tools.identify fit trace.csv --out table.toml
-"""
+"""Identify a table: record a suitable motion over a port, and estimate the constants from a recording."""
 
 import protocol.quiet_start  # noqa: F401 - before the slow imports
 
@@ -18,11 +14,16 @@ from protocol.ending import ended
 from protocol.errors import TableError
 from tools.identification.errors import RecordingError
 
+_EXAMPLES = """examples:
+  {identify} record --port emulator:// --out trace.csv
+  {identify} fit trace.csv --out table.toml
+"""
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
     options = parser().read(arguments)
-    return ended("identify", lambda: _run(options), ConfigError, RecordingError, TableError)
+    return ended(program_name("tools.identify"), lambda: _run(options), ConfigError, RecordingError, TableError)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -33,9 +34,12 @@ def _run(options: argparse.Namespace) -> int:
 def parser() -> Parser:
     """Return the parser of the command line."""
     parser = Parser(
-        prog=program_name("tools.identify"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=program_name("tools.identify"),
+        description=__doc__,
+        epilog=_EXAMPLES.format(identify=program_name("tools.identify")),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    commands = parser.add_subparsers(dest="command", required=True)
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", dest="command", required=True)
     summary = "move a table and record its replies (by default within a quarter of a turn)"
     recorder = commands.add_parser("record", help=summary, description=summary)
     recorder.add_argument("--port", required=True, metavar="URL", help="/dev/ttyUSB0, socket://host:7000, emulator://")

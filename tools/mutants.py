@@ -112,7 +112,7 @@ def _run(options: argparse.Namespace) -> int:
                 explained += 1
             else:
                 unexplained.append(mutation)
-            if options.verbose or not (verdict or reason):
+            if options.all or not (verdict or reason):
                 print(f"{mutation}: {verdict[:160] or reason or 'SURVIVED'}", flush=True)
     finally:
         print(f"{caught} caught, {explained} survived with a reason, {len(unexplained)} survived")
@@ -121,18 +121,24 @@ def _run(options: argparse.Namespace) -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, and return the exit status: 1 if a mutant survived without a reason."""
+    asked = parser()
+    options = asked.parse_args(arguments)
+    if options.count < 1:
+        asked.error(f"--count {options.count}: must be 1 or more")
+    return ended("mutants", lambda: _run(options))
+
+
+def parser() -> Parser:
+    """Return the parser of the command line."""
     parser = Parser(
         prog=program_name("tools.mutants"),
-        description="random mutants of the emulated table that the suite does not catch",
+        description="Plant random faults in the emulated table; print those that the conformance suite misses.",
     )
     parser.add_argument("--seed", type=int, default=0, help="random seed of the mutants and of the suite (default: 0)")
     parser.add_argument("--count", type=int, default=60, help="number of mutants, about 5 s each (default: 60)")
-    parser.add_argument("--verbose", action="store_true", help="print caught mutants too, each with its case")
+    parser.add_argument("--all", action="store_true", help="print caught mutants too, each with its case")
     parser.add_argument("--only", type=int, metavar="INDEX", help=argparse.SUPPRESS)
-    options = parser.parse_args(arguments)
-    if options.count < 1:
-        parser.error(f"--count {options.count}: must be 1 or more")
-    return ended("mutants", lambda: _run(options))
+    return parser
 
 
 if __name__ == "__main__":

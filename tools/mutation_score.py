@@ -223,19 +223,25 @@ def _run(options: argparse.Namespace) -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line, and return the exit status: 1 if fewer mutants are killed than required."""
+    asked = parser()
+    options = asked.parse_args(arguments)
+    for name in ("count", "jobs"):
+        if getattr(options, name) < 1:
+            asked.error(f"--{name} {getattr(options, name)}: must be 1 or more")
+    return ended("mutation_score", lambda: _run(options))
+
+
+def parser() -> Parser:
+    """Return the parser of the command line."""
     parser = Parser(
         prog=program_name("tools.mutation_score"),
-        description="random mutants of firmware, plant, line and planner that the tests do not kill",
+        description="Plant random faults in firmware, plant, line and planner; print those that the tests miss.",
         epilog="example: python -m tools.mutation_score --seed 1 --count 40",
     )
     parser.add_argument("--seed", type=int, default=0, help="random seed of the mutants (default: 0)")
     parser.add_argument("--count", type=int, default=200, help="number of mutants (default: 200)")
     parser.add_argument("--jobs", type=int, default=2, help="number of mutants at a time (default: 2)")
-    options = parser.parse_args(arguments)
-    for name in ("count", "jobs"):
-        if getattr(options, name) < 1:
-            parser.error(f"--{name} {getattr(options, name)}: must be 1 or more")
-    return ended("mutation_score", lambda: _run(options))
+    return parser
 
 
 if __name__ == "__main__":

@@ -14,10 +14,10 @@ from protocol.command_line import Parser, program_name
 from protocol.ending import ended
 from tools.trace_signals import DEFAULT_SIGNALS, SIGNALS, check_signals
 
-_EXAMPLE = """examples:
-  python -m emulator --pty --trace run.csv
-  python -m tools.plot_trace run.csv --out run.png
-  python -m tools.plot_trace run.csv --out detail.png --from 12 --to 14.5 --signals speed_deg_s,duty
+_EXAMPLES = """examples:
+  {table} --pty --trace run.csv
+  {trace} run.csv --out run.png
+  {trace} run.csv --out detail.png --from 12 --to 14.5 --signals speed_deg_s,duty
 
 Of commands close together the first ones are labeled, with the number of the others.
 """
@@ -26,18 +26,19 @@ Of commands close together the first ones are labeled, with the number of the ot
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     options = parser().parse_args(arguments)
-    return ended("plot_trace", lambda: _draw(options), ValueError)
+    return ended(program_name("tools.plot_trace"), lambda: _draw(options), ValueError)
 
 
 def parser() -> Parser:
     """Return the parser of the command line."""
+    table, trace = program_name("emulator"), program_name("tools.plot_trace")
     parser = Parser(
-        prog=program_name("tools.plot_trace"),
+        prog=trace,
         description="Draw a trace that the emulator recorded.",
-        epilog=_EXAMPLE,
+        epilog=_EXAMPLES.format(table=table, trace=trace),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("trace", metavar="TRACE", type=Path, help="a .csv or .npz file of python -m emulator --trace")
+    parser.add_argument("trace", metavar="TRACE", type=Path, help=f"a .csv or .npz file of {table} --trace")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="the picture: .png, .svg or .pdf")
     parser.add_argument(
         "--from", dest="from_s", metavar="S", type=float, help="start time in s (default: of the trace)"

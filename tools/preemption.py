@@ -35,7 +35,7 @@ def draw_preemption(out: Path) -> Path:
     with start_emulator("--pty", "--trace", str(out / "trace.csv")) as port, TableClient.open(port) as table:
         _drive(table)
     figure = draw_trace(
-        read_trace(out / "trace.csv"), "A motion pre-empted at full speed: the speed of the reference has no steps"
+        read_trace(out / "trace.csv"), "Fig. 4: a motion pre-empted at full speed; the reference speed has no steps"
     )
     picture = out / "preemption.png"
     save_picture(figure, picture)

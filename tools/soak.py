@@ -170,16 +170,21 @@ SOAKS: dict[str, tuple[Callable[[float, int], Soak], float, str]] = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the named soaks; return 1 if an invariant failed."""
+    options = parser().parse_args(arguments)
+    return ended("soak", lambda: _run(options))
+
+
+def parser() -> Parser:
+    """Return the parser of the command line."""
     parser = Parser(
         prog=program_name("tools.soak"),
         description="Run the emulator for a long time, and check the invariants.",
         epilog="example: python -m tools.soak noise --share 0.01",
     )
-    parser.add_argument("name", nargs="+", choices=SOAKS)
+    parser.add_argument("name", nargs="+", choices=SOAKS, help=f"which invariants, of {', '.join(SOAKS)}")
     parser.add_argument("--share", type=float, default=1.0, metavar="X", help="of the full size (default 1)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default 0)")
-    options = parser.parse_args(arguments)
-    return ended("soak", lambda: _run(options))
+    return parser
 
 
 def _run(options: argparse.Namespace) -> int:

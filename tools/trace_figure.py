@@ -1,6 +1,6 @@
 """A trace of the emulator as a figure.
 
-From top to bottom: reference and measured speed with the commands that made them, position, and what the motor did.
+From top to bottom: reference and measured speed with their commands, position, and the state of the motor.
 """
 
 from math import inf

@@ -1,16 +1,4 @@
-"""Tune the two gain sets from the table's model, within stated margins, and check them on the emulator.
-
-    python -m tools.tune --out build/tune
-    python -m tools.tune --config table.toml --ms 1.6 --noise 0.3 --out build/tune
-    python -m tools.tune --judge gains.toml --out build/judge
-
-Writes gains.toml (for `python -m emulator --config`), gains.h, figures.json, report.html and its plots. If no gains
-satisfy all bounds, it writes all but gains.toml and gains.h, prints a command line that works, and ends with status 2.
-
-With --judge no gains are searched: the same report is written for the gains of a file, whether they satisfy the bounds
-or not. Its [gains.ramp] and [gains.hold] have proportional_duty_s_deg, integral_time_s and derivative_time_s. The exit
-status is 0 if all bounds are satisfied, 1 if not, and 2 for invalid input.
-"""
+"""Tune the two gain sets from the table's model, within stated margins, and check them on the emulator."""
 
 import protocol.quiet_start  # noqa: F401 - before the slow imports
 
@@ -25,20 +13,41 @@ from protocol.command_line import Parser, program_name
 from protocol.ending import ended
 from tools.bounds import Limits, TuningError
 
+_EXAMPLES = """examples:
+  {tune} --out build/tune
+  {tune} --config table.toml --ms 1.6 --noise 0.3 --out build/tune
+  {tune} --judge gains.toml --out build/judge
+
+Writes gains.toml (for {table} --config), gains.h, figures.json, report.html and its plots. If no gains
+satisfy all bounds, it writes all but gains.toml and gains.h, prints a command line that works, and ends with status 2.
+
+With --judge no gains are searched: the same report is written for the gains of a file, whether they satisfy the bounds
+or not. Its [gains.ramp] and [gains.hold] have proportional_duty_s_deg, integral_time_s and derivative_time_s. The exit
+status is 0 if all bounds are satisfied, 1 if not, and 2 for invalid input.
+"""
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return its exit status."""
     reader = parser()
     options = reader.read(arguments)
     options.defaults = {name: reader.get_default(name) for name in vars(options)}
-    return ended("tune", lambda: int(import_module("tools.tuning.tune_command").run(options)), ConfigError, TuningError)
+    return ended(
+        program_name("tools.tune"),
+        lambda: int(import_module("tools.tuning.tune_command").run(options)),
+        ConfigError,
+        TuningError,
+    )
 
 
 def parser() -> Parser:
     """Return the parser of the command line."""
     defaults = Limits()
     parser = Parser(
-        prog=program_name("tools.tune"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=program_name("tools.tune"),
+        description=__doc__,
+        epilog=_EXAMPLES.format(tune=program_name("tools.tune"), table=program_name("emulator")),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--config", type=Path, help="TOML with the table's constants that differ from the default ones")
     parser.add_argument("--judge", type=Path, metavar="GAINS.toml", help="gains to judge, instead of a search")

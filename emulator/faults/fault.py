@@ -127,14 +127,8 @@ class BouncedTrigger(Fault, kind="bounced-trigger"):
 STRIKES_ONCE = (HalfReply, LateReply)
 """These act once, at the next opportunity, and then end."""
 
-KINDS: Mapping[str, type[Fault]] = {
-    kind.kind: kind
-    for kind in (
-        Drop, Flip, LateReplies, HalfReply, LateReply, Silence, HangUp, WrongBaud, Stall, ExtraLoad, SupplySag,
-        StuckPwm, OneSided, LostCounts, SwappedEncoder, DeadEncoder, MissedTrigger, BouncedTrigger,
-    )
-}  # fmt: skip
-"""Every fault by its name."""
+KINDS: Mapping[str, type[Fault]] = {kind.kind: kind for kind in Fault.__subclasses__()}
+"""Every fault of this file by its name."""
 
 
 def help_of(kind: str) -> str:

@@ -1,12 +1,15 @@
 """The Unix socket of the control channel, accessible only to its owner: one line per request, one line per reply."""
 
 import errno
+import logging
 import os
 import socket
 from contextlib import suppress
 from pathlib import Path
 
 from emulator.server.control_commands import Stand, answer, refusal
+
+_log = logging.getLogger(__name__)
 
 LONGEST_REQUEST = 4096
 """Maximum number of bytes of a request, including its line feed."""
@@ -90,6 +93,8 @@ class ControlSocket:
             return False
         *requests, rest = (self._clients[client] + data).split(b"\n")
         self._clients[client] = rest
+        for request in requests:
+            _log.debug("control request %r", request)
         answers = b"".join(answer(request, stand) for request in requests)
         too_long = len(rest) >= LONGEST_REQUEST
         if too_long:

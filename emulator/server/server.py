@@ -4,6 +4,7 @@ The table is advanced only when needed: when a client or a signal arrives, and w
 also advanced periodically, so that there is never much to catch up with.
 """
 
+import logging
 from collections import deque
 from collections.abc import Callable, Sequence
 from itertools import chain
@@ -13,6 +14,8 @@ from emulator.ports.port import Arrival, Port, spoiled
 from emulator.ports.readiness import wait_for
 from emulator.server.clock import Clock
 from emulator.server.signals import SignalWatch
+
+_log = logging.getLogger(__name__)
 
 if TYPE_CHECKING:
     from emulator.avr.compiled_table import AnyTable
@@ -129,7 +132,7 @@ class Server:
         """Return whether clients must wait, as on any slow line."""
         if self.table.ticks_until_byte() is None:
             return False
-        waiting = self.table.status().received_queue + sum(len(arrival.data) for arrival in self._arrivals)
+        waiting = self.table.received_queue + sum(len(arrival.data) for arrival in self._arrivals)
         return waiting >= _LINE_BUFFER_BYTES or len(self._arrivals) >= _MOST_ARRIVALS
 
     def _sleep_s(self) -> float:
@@ -180,6 +183,7 @@ class Server:
             if arrival.left_before:
                 self.table.disconnect()
             if arrival.data:
+                _log.debug("received %r", arrival.data)
                 self.table.receive(spoiled(arrival.data) if arrival.is_doubtful else arrival.data)
                 self._send_replies()
             if arrival.left_after:
@@ -198,12 +202,14 @@ class Server:
         So they cannot mix with the next client's.
         """
         if self._leaving and self.table.ticks_until_byte() is None:
+            _log.debug("a client has left")
             self.table.disconnect()
             self._leaving = False
 
     def _send_replies(self) -> None:
         data = self.table.transmit()
         if data and not self._leaving:
+            _log.debug("sent %r", data)
             for port in self._ports:
                 port.send(data)
 

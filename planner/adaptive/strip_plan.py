@@ -92,6 +92,8 @@ def _planned(
     plan = planner(problem)
     if isinstance(plan, NoPlan):
         return plan.reason
+    if plan.pauses:
+        return f"a pause is needed after pose {plan.pauses[0].step}"
     joints_deg = arm_motion(arm, plan).robot_deg
     fault = arm_fault(PlannedArm(surroundings.cell, strip.T_WS, joints_deg), plan)
     if fault is not None:

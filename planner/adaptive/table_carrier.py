@@ -152,10 +152,10 @@ class TableCarrier:
     def _ends(self, planned: RunInput) -> tuple[Stance, Stance]:
         """Return how arm and table stand before a motion, and after it."""
         joints = self._surroundings.cell.arm.joints(planned.joints_deg[[0, -1]])
-        configuration = Configuration.parse(planned.plan.configuration)
+        names = planned.plan.configurations
         return (
-            Stance(joints[0], planned.motion().start_deg, configuration),
-            Stance(joints[1], float(planned.plan.angles_deg[-1]), configuration),
+            Stance(joints[0], planned.motion().start_deg, Configuration.parse(names[0])),
+            Stance(joints[1], float(planned.plan.angles_deg[-1]), Configuration.parse(names[-1])),
         )
 
     def _stand_at(self, stance: Stance) -> None:

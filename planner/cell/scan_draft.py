@@ -22,6 +22,7 @@ from planner.kinematics.arm import Arm
 from planner.kinematics.value import ValueFunction
 from planner.table.cost import default_weights
 from planner.table.motion import Limits
+from protocol.command_line import program_name
 
 TURN_TO_UP = {
     "z": (0.0, 0.0, 0.0),
@@ -171,7 +172,7 @@ class Draft:
                 ("table_acceleration_deg_s2", f"{limits.acceleration_deg_s2:g}", "maximum acceleration of the table"),
             ],
         }
-        head = _HEAD.format(mesh=mesh, size=f"{x:.1f} x {y:.1f} x {z:.1f}")
+        head = _HEAD.format(planner=program_name("planner"), mesh=mesh, size=f"{x:.1f} x {y:.1f} x {z:.1f}")
         return head + "".join(_section(name, rows) for name, rows in sections.items())
 
 
@@ -182,7 +183,7 @@ _KEYS = {
     "wall_margin_mm": "distance of the strips' ends from the walls",
 }
 _HEAD = """\
-# A scan of {mesh}, {size} mm, written by `python -m planner new-scan`.
+# A scan of {mesh}, {size} mm, written by `{planner} new-scan`.
 # Lengths in mm, angles in deg; placements are x y z yaw pitch roll (ZYZ, as in the robot language).
 # In place of a pattern, [path] takes file = "path.csv". Patterns and path files: docs/own-part.md.
 """
@@ -233,12 +234,26 @@ def _layouts(kind: str, part: Part) -> Iterator[tuple[tuple[str, float], ...]]:
 
 def _speed_mm_s(part: Part) -> float:
     """Return a speed at which the table can compensate a rotation around the part."""
-    length_mm, width_mm, _ = sorted(part.mesh.extents, reverse=True)
+    length_mm, width_mm = np.ptp(np.asarray(part.mesh.vertices) @ part.cell.T_TW[:2, :3].T, axis=0)
     return float(f"{min(_FASTEST_MM_S, _FASTEST_RAD_S * 0.25 * (length_mm + width_mm)):.2g}")
+
+
+def _undone_by_the_table(draft: Draft) -> Draft:
+    """Return the draft, slower if the beam turns about the vertical faster than the table can undo it.
+
+    That is so where a ring is narrower than the part, as at the top of a cone.
+    """
+    if draft.kind != "cylinder":  # other patterns can be scanned without a turn of the table
+        return draft
+    beams = draft.path().T_WS[:, :3, 2] @ draft.part.cell.T_TW[:2, :3].T
+    turns_rad = np.abs(np.diff(np.unwrap(np.arctan2(beams[:, 1], beams[:, 0]))))
+    slower = min(1.0, _FASTEST_RAD_S * draft.step_s / max(float(turns_rad.max(initial=0.0)), 1e-9))
+    return replace(draft, speed_mm_s=float(f"{slower * draft.speed_mm_s:.2g}"))
 
 
 def _timed(draft: Draft) -> Draft:
     """Return the draft with a time step, and a lower speed if necessary, for a moderate number of locations."""
+    draft = _undone_by_the_table(draft)
     duration_s = (draft.path().count - 1) * draft.step_s
     step_s = min(max(_STEP_S, duration_s / _MOST), _LONGEST_STEP_S, max(duration_s / _FEWEST, _SHORTEST_STEP_S))
     slower = min(1.0, duration_s / (_FEWEST * step_s))

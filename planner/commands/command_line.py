@@ -18,6 +18,7 @@ from planner.defaults import (
     PROFILES_HZ,
     RAY_SHOOTING,
     RECEDING,
+    REPORT_FILE,
     RUN_ON_DEG,
     SHARE_SEEN,
     TOLERANCE_DEG,
@@ -29,16 +30,14 @@ from protocol.data_file import did_you_mean
 from protocol.number_options import number, positive_number, share, whole_number
 
 _Commands = "argparse._SubParsersAction[Parser]"
-REPORT_FILE = "report.html"
 
 
 def parser() -> Parser:
     """Return the parser; its result has the name of the command in `command`."""
     top = Parser(
-        prog=program_name("planner"),
+        prog=_program(),
         description="Plan the motion of a rotary table under a scanning robot arm.",
-        epilog="examples: python -m planner new-scan part.stl --out part.toml;"
-        " python -m planner map mould --out build/mould",
+        epilog=f"examples: {_program()} new-scan part.stl --out part.toml; {_program()} map mould --out build/mould",
     )
     commands = top.add_subparsers(title="commands", metavar="COMMAND", dest="command", required=True)
     _add_map(commands)
@@ -51,12 +50,16 @@ def parser() -> Parser:
     return top
 
 
+def _program() -> str:
+    return program_name("planner")
+
+
 def _add_map(commands: "argparse._SubParsersAction[Parser]") -> None:
     parser = commands.add_parser(
         "map",
         help="compute and draw a scan's configuration map",
         description="Rate every location of a scan at every table angle, and explain forbidden poses.",
-        epilog="example: python -m planner map mould --configuration LEFTY-ABOVE-NOFLIP --out build/mould",
+        epilog=f"example: {_program()} map mould --configuration LEFTY-ABOVE-NOFLIP --out build/mould",
     )
     _add_scan_option(parser)
     _add_map_option(parser, configuration="all")
@@ -69,7 +72,7 @@ def _add_plan(commands: "argparse._SubParsersAction[Parser]") -> None:
         help="plan the table's motion along a scan",
         description="Choose the table's motion across a scan's configuration map. Exit status 1 where there is none,"
         " or none that the arm can follow.",
-        epilog="example: python -m planner plan mould --compare --out build/mould",
+        epilog=f"example: {_program()} plan mould --compare --out build/mould",
     )
     _add_scan_option(parser)
     _add_map_option(parser, configuration="best")
@@ -93,9 +96,9 @@ def _add_run(commands: "argparse._SubParsersAction[Parser]") -> None:
         "run",
         help="carry out a plan on a table, and verify the motion",
         description="Stream a plan to the table at a port; exit status 1 when the motion deviated from the plan.",
-        epilog="example: python -m planner run build/cylinder/plan.json --port /dev/ttyUSB0 --out build/cylinder/run",
+        epilog=f"example: {_program()} run build/cylinder/plan.json --port /dev/ttyUSB0 --out build/cylinder/run",
     )
-    parser.add_argument("plan", metavar="PLAN.json", type=Path, help="a plan from python -m planner plan")
+    parser.add_argument("plan", metavar="PLAN.json", type=Path, help=f"a plan from {_program()} plan")
     parser.add_argument("--map", metavar="FILE", type=Path, help="the plan's map (default: map.npz beside the plan)")
     _add_run_options(parser)
 
@@ -107,7 +110,7 @@ def _add_track(commands: "argparse._SubParsersAction[Parser]") -> None:
         description="Decide the table's motion step by step from the locations in view, stream it to the table, and"
         " verify it. The table can come to rest within the view at any moment. Exit status 1 when the motion deviated"
         " from what was decided.",
-        epilog="example: python -m planner track mould --port emulator:// --view 30 --out build/mould-track",
+        epilog=f"example: {_program()} track mould --port emulator:// --view 30 --out build/mould-track",
     )
     _add_scan_option(parser)
     parser.add_argument(
@@ -148,8 +151,8 @@ def _add_scan(commands: "argparse._SubParsersAction[Parser]") -> None:
         help="scan a workpiece with a simulated probe, and compute the error budget of its cloud",
         description="Plan a scan, move the table, take laser profiles and align them to one cloud; exit status 1 when"
         " it ended early.",
-        epilog="examples: python -m planner scan cylinder --decimals 3 --out build/cylinder;"
-        " python -m planner scan part.toml --adapt 0.99 --out build/part",
+        epilog=f"examples: {_program()} scan cylinder --decimals 3 --out build/cylinder;"
+        f" {_program()} scan part.toml --adapt 0.99 --out build/part",
     )
     _add_scan_option(parser)
     parser.add_argument("--mesh", type=Path, metavar="FILE", help="replace the workpiece by this mesh")
@@ -218,9 +221,9 @@ def _add_show(commands: "argparse._SubParsersAction[Parser]") -> None:
         "show",
         help="show a run as one HTML page",
         description="Write a page that shows a run, with everything in it: map, paths, profile, deviations, commands.",
-        epilog="example: python -m planner show build/cylinder/run",
+        epilog=f"example: {_program()} show build/cylinder/run",
     )
-    parser.add_argument("folder", metavar="DIR", type=Path, help="output folder of python -m planner run")
+    parser.add_argument("folder", metavar="DIR", type=Path, help=f"output folder of {_program()} run")
     parser.add_argument("--out", metavar="FILE", type=Path, help=f"the page (default: {REPORT_FILE} in DIR)")
 
 
@@ -229,7 +232,7 @@ def _add_new_scan(commands: "argparse._SubParsersAction[Parser]") -> None:
         "new-scan",
         help="write a scan file for a mesh",
         description="Write a commented scan file for a mesh, with a pattern that fits and that can be planned.",
-        epilog="example: python -m planner new-scan part.stl --out part.toml",
+        epilog=f"example: {_program()} new-scan part.stl --out part.toml",
     )
     parser.add_argument("mesh", metavar="MESH", type=Path, help="an STL, PLY or OBJ file with a closed surface")
     parser.add_argument("--unit", choices=tuple(MILLIMETERS), help="unit of length in the file (default: mm)")

@@ -22,6 +22,7 @@ from planner.plans.arm_motion import ArmMotion
 from planner.plans.plan import Plan
 from planner.plans.problem import Problem
 from planner.plans.verification import verify
+from protocol.command_line import program_name
 from protocol.progress import progress_line
 from protocol.whole_file import write_whole
 
@@ -127,10 +128,10 @@ def summary(drafted: Drafted, out: Path) -> str:
     ]
     if warning is not None:
         lines.append(f"note:    {warning}")
-    folder = Path("build") / out.stem
+    folder, planner = Path("build") / out.stem, program_name("planner")
     lines += [
-        f"next:    python -m planner plan {quote(str(out))} --out {quote(str(folder))}",
-        f"         python -m planner run {quote(str(folder / 'plan.json'))} --port emulator:// --arm-away"
+        f"next:    {planner} plan {quote(str(out))} --out {quote(str(folder))}",
+        f"         {planner} run {quote(str(folder / 'plan.json'))} --port emulator:// --arm-away"
         f" --out {quote(str(folder / 'run'))}",
     ]
     return "\n".join(lines) + "\n"

@@ -4,12 +4,12 @@ import argparse
 import sys
 
 from planner.commands import options
-from planner.commands.command_line import REPORT_FILE
-from planner.commands.show import write_report
+from planner.defaults import REPORT_FILE
 from planner.errors import PlannerError
 from planner.execution.run import RunOptions, run_plan
 from planner.execution.run_verification import RunVerification
 from protocol import TableError
+from protocol.color import colored
 from protocol.progress import progress_line
 
 _DEVIATED, _NOT_RUN = 1, 2
@@ -20,14 +20,13 @@ def run(arguments: argparse.Namespace) -> int:
     asked = run_options(arguments)
     show = progress_line("run", sys.stderr)
     try:
-        checked, duration = run_plan(arguments.plan, arguments.out, asked, arguments.map, show)
+        checked, duration = run_plan(arguments.plan, arguments.out, asked, arguments.map, show, arguments.command_line)
     except TableError as error:
         raise PlannerError(str(error)) from error
     except OSError as error:
         raise PlannerError(f"{arguments.out}: cannot write the run ({error.strerror or error})") from error
-    write_report(arguments.out, arguments.out / REPORT_FILE, arguments.command_line)
     sys.stdout.write(summary(checked))
-    sys.stderr.write(f"{duration}\n")
+    sys.stderr.write(f"{duration}\nthe report is {arguments.out / REPORT_FILE}\n")
     if checked.failure is not None:
         sys.stderr.write(f"the data recorded so far is in {arguments.out}\n")
     return status_of(checked)
@@ -58,13 +57,13 @@ def run_options(arguments: argparse.Namespace) -> RunOptions:
 
 
 def summary(checked: RunVerification) -> str:
-    """Return the results of a run, as text."""
-    lines = [checked.verdict]
-    for name, each in checked.deviations.items():
-        lines.append(
+    """Return verdict and figures of a run, as text for stdout."""
+    lines = [
+        colored(checked.verdict, "good" if checked.is_verified else "bad", sys.stdout),
+        *(
             f"{name:10} {each.at_locations_deg:.4f} deg off at the locations, {each.anywhere_deg:.4f} anywhere"
-        )
-    lines += [
+            for name, each in checked.deviations.items()
+        ),
         f"map        {len(checked.forbidden_steps)} steps touched a forbidden cell; {checked.margin_deg:.2f} deg left",
         f"cost       planned {checked.planned_cost.total:.4f}"
         + (f", executed {checked.executed_cost.total:.4f}" if checked.executed_cost else ""),

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from planner.adaptive.turn_over import (
 from planner.cell.scan import Scan, load_scan, with_mesh
 from planner.cell.workpiece import Cylinder
 from planner.commands import options
-from planner.defaults import SHARE_SEEN
+from planner.defaults import REPORT_FILE, SHARE_SEEN
 from planner.errors import PlannerError
 from planner.scanning.latched_run import TriggerConditions
 from planner.scanning.scan_file import save_scan, scan_document
@@ -26,13 +27,14 @@ from planner.scanning.scan_report import scan_report, verdict_of
 from planner.scanning.scan_run import Scanned, ScanOptions, scan_workpiece
 from planner.set_aside import set_aside
 from protocol import TableError
+from protocol.color import colored
 from protocol.extras import need
 from protocol.page import Origin
 from protocol.progress import Progress, progress_line, show_line
 from protocol.whole_file import write_whole
 
 _INCOMPLETE = 1
-SCAN_RESULTS = ("cloud.ply", "cloud.xyz", "normals.ply", "poses.csv", JOINED_FILE, "scan.json", "report.html")
+SCAN_RESULTS = ("cloud.ply", "cloud.xyz", "normals.ply", "poses.csv", JOINED_FILE, "scan.json", REPORT_FILE)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -68,21 +70,24 @@ def run(arguments: argparse.Namespace) -> int:
         seed=arguments.seed,
     )
     out: Path = arguments.out
+    in_simulated_time = arguments.port.startswith("emulator://")
+    begun = None if in_simulated_time else datetime.now().astimezone().isoformat(timespec="seconds")
     try:
         if _is_adaptive(arguments) or not scan.has_path:
-            return _adaptive(scan, known, asked, arguments)
+            return _adaptive(scan, known, asked, arguments, Origin(arguments.command_line, begun))
         scanned = scan_workpiece(scan, asked, out, _progress_of)
         save_scan(out / "scan.json", scan_document(scanned))
-        write_whole(out / "report.html", scan_report(scanned, Origin(arguments.command_line)))
+        write_whole(out / REPORT_FILE, scan_report(scanned, Origin(arguments.command_line, begun)))
     except TableError as error:
         raise PlannerError(str(error)) from error
     except OSError as error:
         raise PlannerError(f"{out}: cannot write the scan ({error.strerror or error})") from error
-    sys.stdout.write(summary(scanned))
+    verdict = colored(verdict_of(scanned), "good" if scanned.is_whole else "bad", sys.stdout)
+    sys.stdout.write(f"{scanned.scan.name}: {verdict}\n{summary(scanned)}")
     return 0 if scanned.is_whole else _INCOMPLETE
 
 
-def _adaptive(scan: Scan, known: Scan, asked: ScanOptions, arguments: argparse.Namespace) -> int:
+def _adaptive(scan: Scan, known: Scan, asked: ScanOptions, arguments: argparse.Namespace, origin: Origin) -> int:
     """Scan adaptively; `known` has the mesh that the strips are chosen by. Return the exit status."""
     out: Path = arguments.out
     wanted = AdaptOptions(
@@ -94,25 +99,24 @@ def _adaptive(scan: Scan, known: Scan, asked: ScanOptions, arguments: argparse.N
     show_line("", sys.stderr)
     document = scan_document(found.scanned) | {"adaptive": adaptive_document(found)}
     save_scan(out / "scan.json", document)
-    write_whole(out / "report.html", adaptive_report(found, Origin(arguments.command_line)))
+    write_whole(out / REPORT_FILE, adaptive_report(found, origin))
     sys.stdout.write(summary(found.scanned) + adaptive_summary(found))
     is_joined = True
     if arguments.turn_over and found.session.failure is None:
         turned = scan_turned_over(found, scan, asked, wanted, out, _progress_of, _show_strips)
-        is_joined = _write_turned_over(turned, document, arguments)
+        is_joined = _write_turned_over(turned, document, out, origin)
     if found.session.contradicts:
         raise PlannerError(f"{found.session.failure}; what was scanned is in {out}")
     return 0 if found.has_succeeded and is_joined else _INCOMPLETE
 
 
-def _write_turned_over(turned: TurnedOver, document: dict[str, Any], arguments: argparse.Namespace) -> bool:
+def _write_turned_over(turned: TurnedOver, document: dict[str, Any], out: Path, origin: Origin) -> bool:
     """Write and print what the second placement came to, and return whether the clouds were joined."""
-    out: Path = arguments.out
     show_line("", sys.stderr)
     second = out / TURNED_FOLDER
     adaptive = adaptive_document(turned.second)
     save_scan(second / "scan.json", scan_document(turned.second.scanned) | {"adaptive": adaptive})
-    write_whole(second / "report.html", adaptive_report(turned.second, Origin(arguments.command_line)))
+    write_whole(second / REPORT_FILE, adaptive_report(turned.second, origin))
     save_scan(out / "scan.json", document | {"turned_over": turned_over_document(turned)})
     sys.stdout.write(turned_over_summary(turned))
     return not isinstance(turned.joined, str)
@@ -139,7 +143,7 @@ def _check_surface_file(file: Path) -> None:
 
 
 def summary(scanned: Scanned) -> str:
-    """Return the results of a scan, as text."""
+    """Return the figures of a scan, as text."""
     run, budget = scanned.run, scanned.budget
     mean, sigma, within, greatest = (f"{1e3 * value:.1f}" for value in budget.distances)
     shares = [
@@ -155,11 +159,10 @@ def summary(scanned: Scanned) -> str:
     shares.append(("all together", f"{1e3 * total.displacement_mm:.2f}", f"{1e3 * total.across_mm:.2f}", ""))
     shares.append(("all switched off", f"{1e3 * budget.none_mm:.1g}", "", ""))
     lines = [
-        f"{scanned.scan.name}: {verdict_of(scanned)}",
         f"profiles   {run.triggers} taken, {len(run.dropped)} dropped because a latch was missing",
         f"dead line  {scanned.dead_line}",
-        f"distance   mean {mean}, sigma {sigma}, 95 % within {within}, maximum {greatest} micrometers",
-        f"{'rms, in micrometers':24} {'displacement':>12} {'across':>8} {'without':>8}",
+        f"distance   mean {mean}, sigma {sigma}, 95 % within {within}, maximum {greatest} µm",
+        f"{'rms (µm)':24} {'displacement':>12} {'across':>8} {'without':>8}",
         *(f"  {name:22} {alone:>12} {across:>8} {without:>8}".rstrip() for name, alone, across, without in shares),
     ]
     return "\n".join(lines) + "\n"

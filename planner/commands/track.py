@@ -5,10 +5,10 @@ import sys
 
 from planner.cell.scan import load_scan
 from planner.commands import options
-from planner.commands.command_line import REPORT_FILE
 from planner.commands.run import run_options, status_of, summary
-from planner.commands.show import write_report
+from planner.defaults import REPORT_FILE
 from planner.errors import PlannerError
+from planner.execution.run_report import write_report
 from planner.set_aside import set_aside
 from planner.tracking.track_file import decision_times_s
 from planner.tracking.track_run import RESULTS, Finished, TrackOptions, track_scan
@@ -32,11 +32,11 @@ def run(arguments: argparse.Namespace) -> int:
     )
     try:
         finished = track_scan(scan, arguments.out, asked, options.say, lambda label: progress_line(label, sys.stderr))
+        write_report(arguments.out, arguments.out / REPORT_FILE, arguments.command_line)
     except TableError as error:
         raise PlannerError(str(error)) from error
     except OSError as error:
         raise PlannerError(f"{arguments.out}: cannot write the run ({error.strerror or error})") from error
-    write_report(arguments.out, arguments.out / REPORT_FILE, arguments.command_line)
     sys.stdout.write(summary(finished.checked) + track_summary(finished))
     sys.stderr.write(f"{finished.duration}\n")
     if finished.checked.failure is not None:

@@ -38,7 +38,7 @@ def turning_time_s(plan: Plan, joints_deg: FloatArray, max_speeds_deg_s: FloatAr
         joints_deg: (n + 1, 6) the arm's joints at each scan location.
         max_speeds_deg_s: (6,) maximum joint speeds.
     """
-    times_s = [np.abs(joints_deg[step + 1] - joints_deg[step]) / max_speeds_deg_s for step, _, _ in plan.pauses]
+    times_s = [np.abs(joints_deg[step + 1] - joints_deg[step]) / max_speeds_deg_s for step, *_ in plan.pauses]
     return float(np.max(times_s, initial=0.0))
 
 

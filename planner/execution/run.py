@@ -1,12 +1,14 @@
 """The execution of a plan file, from the check before the first byte to the verification and the output files."""
 
+import logging
 import time
+from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from planner.defaults import RUN_ON_DEG, TOLERANCE_DEG
+from planner.defaults import REPORT_FILE, RUN_ON_DEG, TOLERANCE_DEG
 from planner.execution.clear_path import check_ends, nearest_turns, turns_to_start
 from planner.execution.execute import Settings, bring_to, execute, resting_deg
 from planner.execution.robot_motion import robot_motion, turning_time_s
@@ -20,6 +22,7 @@ from planner.execution.run_file import (
 )
 from planner.execution.run_input import RunInput, load_run_input
 from planner.execution.run_plots import plot_run
+from planner.execution.run_report import write_report
 from planner.execution.run_verification import RunVerification, verify_run
 from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_motion import PauseTimes, TableMotion
@@ -32,6 +35,8 @@ from protocol import TableClient
 from protocol.bench import bench_of
 from protocol.control_channel import ControlChannel
 from protocol.progress import Progress
+
+_log = logging.getLogger(__name__)
 
 
 class RunOptions(NamedTuple):
@@ -75,8 +80,17 @@ def run_plan(
     options: RunOptions,
     map_file: Path | None = None,
     progress: Progress | None = None,
+    command: str = "",
 ) -> Finished:
     """Execute a plan on the table at a port, write the results to `out`, and return them.
+
+    Args:
+        plan_file: the plan.
+        out: the folder.
+        options: the port, and how the plan is run.
+        map_file: the plan's map; by default beside the plan.
+        progress: called with the time that has passed and all of it.
+        command: the command line that asks for the run, for the report.
 
     Raises:
         PlannerError: the plan must not or cannot be executed; the table has not moved.
@@ -94,28 +108,31 @@ def run_plan(
     out.mkdir(parents=True, exist_ok=True)
     port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
     with TableClient(port, options.timeout_s * options.time_scale, options.decimals) as table:
-        view = bench_of(port) if options.control is None else ControlChannel(options.control, CONTROL_TIMEOUT_S)
+        simulated = bench_of(port)
+        view = simulated if options.control is None else ControlChannel(options.control, CONTROL_TIMEOUT_S)
+        begun = None if simulated is not None else datetime.now().astimezone().isoformat(timespec="seconds")
         table_began_s, wall_began_s = table.clock.now_s(), time.perf_counter()
         turns = _turns(run_input, motion, resting_deg(table, wire), options.arm_is_away)
         run_input = run_input.turned(turns)
         motion = run_input.motion(options.pause_times)
+        _log.debug("to the start at %.6g deg, %d turn(s) from the plan's", motion.start_deg, turns)
         bring_to(table, motion.start_deg, limits, wire)
         settings = Settings(lag_s=options.lag_s, lead_s=options.lead_s, run_on_deg=options.run_on_deg)
         record = execute(table, motion, limits, wire, settings, view, progress)
         duration = Duration(table.clock.now_s() - table_began_s, time.perf_counter() - wall_began_s)
     conditions = RunConditions(
-        options.port, wire, options.lead_s, options.tolerance_deg, turns, options.pause_times, options.run_on_deg
+        options.port, wire, options.lead_s, options.tolerance_deg, turns, options.pause_times, options.run_on_deg, begun
     )
     stored = StoredRun(run_input, conditions, motion, record)
     try:
-        return Finished(_written(out, plan_file, map_file, stored), duration)
+        return Finished(_written(out, plan_file, map_file, stored, command), duration)
     except KeyboardInterrupt as interrupt:
         if record.failure is not None:
             interrupt.add_note(record.failure)
         raise
 
 
-def _written(out: Path, plan_file: Path, map_file: Path, stored: StoredRun) -> RunVerification:
+def _written(out: Path, plan_file: Path, map_file: Path, stored: StoredRun, command: str) -> RunVerification:
     """Verify a run, write all its data, and return the results."""
     run_input, conditions, motion, record = stored
     checked = verify_run(run_input, motion, record, conditions.lead_s, conditions.tolerance_deg)
@@ -123,6 +140,7 @@ def _written(out: Path, plan_file: Path, map_file: Path, stored: StoredRun) -> R
     save_run(out, run_input, conditions, motion, record, checked)
     save_robot(out, robot_motion(motion, run_input.joints_deg), record)
     plot_run(stored, checked, out / "run.png")
+    write_report(out, out / REPORT_FILE, command)
     return checked
 
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planner.defaults import REPORT_FILE
 from planner.errors import PlannerError
 from planner.execution.robot_motion import RobotMotion
 from planner.execution.run_input import RunInput, load_run_input
@@ -23,6 +24,7 @@ from planner.execution.table_motion import PauseTimes, Phase, TableMotion
 from planner.map.map_file import MAP_FILE
 from planner.plans.plan_file import PLAN_FILE
 from planner.table.wire import Wire
+from protocol.command_line import program_name
 from protocol.data_file import DataFileError, read_json
 from protocol.trapezoid import MotionCommand
 from protocol.whole_file import whole_file, write_whole
@@ -30,7 +32,7 @@ from protocol.whole_file import whole_file, write_whole
 _FORMAT = "seventh-axis run"
 _FORMAT_VERSION = 1
 RUN_FILE, SEEN_FILE = "run.json", "run.csv"
-RUN_RESULTS = (RUN_FILE, SEEN_FILE, "run.png", "robot.csv", "robot.json", "report.html")
+RUN_RESULTS = (RUN_FILE, SEEN_FILE, "run.png", "robot.csv", "robot.json", REPORT_FILE)
 """The files that a run and its page write to a folder, besides the copies of plan and map."""
 
 
@@ -50,6 +52,7 @@ class RunConditions(NamedTuple):
         pause_times: duration of the robot's actions in a pause.
         run_on_deg: maximum angle that the table was allowed to run on if the line failed; None in a run of an earlier
             version.
+        begun: date and time of the start; None in simulated time.
     """
 
     port: str
@@ -59,6 +62,7 @@ class RunConditions(NamedTuple):
     turns: int
     pause_times: PauseTimes
     run_on_deg: float | None = None
+    begun: str | None = None
 
 
 class StoredRun(NamedTuple):
@@ -159,10 +163,10 @@ def load_run(folder: Path) -> StoredRun:
         )
     except OSError as error:
         raise RunFileError(
-            f"{folder}: contains no run ({error.strerror or error}); python -m planner run writes one"
+            f"{folder}: contains no run ({error.strerror or error}); {program_name('planner')} run writes one"
         ) from error
     except DataFileError as error:
-        raise RunFileError(f"{error}; python -m planner run writes a folder with {RUN_FILE}") from error
+        raise RunFileError(f"{error}; {program_name('planner')} run writes a folder with {RUN_FILE}") from error
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, csv.Error) as error:
         raise RunFileError(f"{folder}: its run is damaged: {type(error).__name__}, {error}") from error
     run_input = load_run_input(folder / PLAN_FILE).turned(conditions.turns)

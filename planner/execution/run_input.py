@@ -18,6 +18,7 @@ from planner.plans.plan_check import contradiction
 from planner.plans.plan_file import StoredPlan, load_plan
 from planner.plans.problem import Problem
 from planner.plans.verification import verify
+from protocol.command_line import program_name
 
 
 class RunInputError(PlannerError):
@@ -68,7 +69,7 @@ def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:
     if not map_file.is_file():
         raise RunInputError(
             f"{map_file}: the map of the plan was not found;"
-            f" to write it: python -m planner map {stored.scan} --out {map_file.parent}"
+            f" to write it: {program_name('planner')} map {stored.scan} --out {map_file.parent}"
         )
     maps = load_maps(map_file)
     configuration = Configuration.parse(stored.plan.configuration)

@@ -1,12 +1,15 @@
 """The HTML page of a run: verdict, figures, pictures as inline SVG, and all commands."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
-from planner.execution.run_file import StoredRun
+from planner.execution.run_file import StoredRun, load_run
 from planner.execution.run_plots import deviation_figure, map_figure, motion_figure
-from planner.execution.run_verification import RunVerification
+from planner.execution.run_verification import RunVerification, verify_run
 from planner.plot_style import svg_of
-from protocol.page import Origin, counted, details, figure, heading, page, paragraph, table, verdict
+from protocol import page as html
+from protocol.page import Origin, counted, details, figure, heading, paragraph, table, verdict
+from protocol.whole_file import write_whole
 
 _NAMES = {
     "encoder": "encoder",
@@ -17,8 +20,21 @@ _NAMES = {
 }
 
 
-def run_report(run: StoredRun, checked: RunVerification, origin: Origin | None = None) -> str:
-    """Return the page of a run."""
+def write_report(folder: Path, page: Path, command: str = "") -> None:
+    """Write the page of the run that a folder holds; `command` is the command line that asks for it.
+
+    Raises:
+        PlannerError: the folder holds no run, or it is damaged.
+        OSError: the page cannot be written.
+    """
+    run = load_run(folder)
+    conditions = run.conditions
+    checked = verify_run(run.run_input, run.motion, run.record, conditions.lead_s, conditions.tolerance_deg)
+    write_whole(page, run_report(run, checked, command))
+
+
+def run_report(run: StoredRun, checked: RunVerification, command: str = "") -> str:
+    """Return the page of a run; `command` is the command line that asks for it."""
     wire = run.conditions.wire
     blocks = (
         verdict(checked.verdict, checked.is_verified),
@@ -46,7 +62,7 @@ def run_report(run: StoredRun, checked: RunVerification, origin: Origin | None =
         details(f"all {counted(len(run.record.sent), 'motion command')}", _commands(run)),
         _corrections(run),
     )
-    return page(f"Run of {run.run_input.name}", blocks, origin)
+    return html.page(f"Run of {run.run_input.name}", blocks, Origin(command, run.conditions.begun))
 
 
 def _summary(run: StoredRun, checked: RunVerification) -> Iterator[tuple[str, str]]:

@@ -4,6 +4,7 @@ Names, comments, normals, colors, textures and materials are skipped, in any enc
 """
 
 import io
+import logging
 import re
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +15,8 @@ from plyfile import PlyData, PlyElementParseError, PlyParseError
 from planner.arrays import FloatArray, IndexArray
 from planner.errors import WorkpieceError
 from planner.geometry.polygons import triangulated
+
+_log = logging.getLogger(__name__)
 
 _STL_HEADER_BYTES = 84
 _STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -50,7 +53,9 @@ def read_mesh_file(file: Path) -> MeshFile:
     if reader is None:
         raise WorkpieceError(f"{file}: a mesh file must end in .stl, .ply or .obj")
     try:
-        return reader(file.read_bytes())
+        content = file.read_bytes()
+        _log.debug("read %s, %d bytes", file, len(content))
+        return reader(content)
     except OSError as error:
         raise WorkpieceError(f"{file}: cannot be read ({error.strerror or error})") from error
     except WorkpieceError as error:

@@ -5,6 +5,7 @@ maps give the same bytes.
 """
 
 import json
+import logging
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -18,6 +19,8 @@ from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap, ConfigurationMapError
 from protocol.software_version import software_version
 from protocol.whole_file import whole_file
+
+_log = logging.getLogger(__name__)
 
 MAP_FILE = "map.npz"
 """The name of a map's file in a folder with results."""
@@ -89,6 +92,7 @@ def load_maps(file: Path) -> dict[Configuration, ConfigurationMap]:
 def _read(file: Path) -> dict[str, Any]:
     try:
         with file.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
+            _log.debug("read %s", file)
             return {name: stored[name] for name in stored.files}
     except OSError as error:
         raise MapFileError(f"{file}: cannot be read ({error.strerror or error})") from error

@@ -1,5 +1,6 @@
 """From a scan to the best plan: its maps, a problem for each arm configuration, and the results of the planner."""
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,8 @@ from planner.plans.plan_file import PLAN_FILE, plan_document, save_plan
 from planner.plans.problem import Problem
 from planner.plans.verification import Verification, verify
 from protocol.progress import ProgressOf
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,5 +110,6 @@ def plan_scan(
     with compiling_beside(compiled, progress):
         problem = map_problem(scan, progress("distance field"))
         maps = build_maps(problem, asked, angle_count, progress("map" if is_compiled() else "map (compiling, once)"))
+        _log.debug("%s: %d locations, %d table angles, %d map(s)", scan.name, len(problem.T_WS), angle_count, len(maps))
         problems = {each.label: scan_problem(scan, map_, start_angle_deg) for each, map_ in maps.items()}
         return ScanPlans(scan, problems, best_configuration(problems, planner, progress("plan")))

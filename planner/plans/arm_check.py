@@ -48,8 +48,9 @@ def arm_fault(planned: PlannedArm, plan: Plan) -> str | None:
     if len(far):
         location = int(far[0])
         return f"at location {location} its joints put the probe {np.linalg.norm(off[location, :3, 3]):.3f} mm away"
-    asked = Configuration.parse(plan.configuration)
-    others = np.flatnonzero(configurations(cell.arm, joints) != asked)
+    asked = [Configuration.parse(name) for name in plan.configurations]
+    others = np.flatnonzero(configurations(cell.arm, joints) != np.array(asked))
     if len(others):
-        return f"at location {int(others[0])} the joints are not in {asked.label}, the configuration of the plan"
+        location = int(others[0])
+        return f"at location {location} the joints are not in {asked[location].label}, the configuration of the plan"
     return None

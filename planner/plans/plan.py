@@ -25,6 +25,8 @@ class Pause(NamedTuple):
     step: int
     from_angle_deg: float
     to_angle_deg: float
+    configuration: str | None = None
+    """The configuration of the arm from there on; None: it does not change."""
 
 
 class Wait(NamedTuple):
@@ -109,6 +111,15 @@ class Plan:
             for pause in self.pauses
         )
         return replace(self, angles_deg=self.angles_deg + shifted_deg, pauses=pauses)
+
+    @property
+    def configurations(self) -> list[str]:
+        """The configuration of the arm at each location."""
+        names = [self.configuration] * len(self.angles_deg)
+        for pause in self.pauses:
+            if pause.configuration is not None:
+                names[pause.step + 1 :] = [pause.configuration] * (len(names) - pause.step - 1)
+        return names
 
 
 Outcome = Plan | NoPlan

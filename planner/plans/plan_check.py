@@ -16,7 +16,7 @@ def contradiction(plan: Plan) -> str | None:
         plan: a plan of finite numbers, with one angle and one speed more than accelerations.
     """
     paused = {pause.step for pause in plan.pauses}
-    for step, from_deg, to_deg in plan.pauses:
+    for step, from_deg, to_deg, _ in plan.pauses:
         if not 0 <= step < len(plan.accelerations_deg_s2) or (from_deg, to_deg, 0.0) != (
             plan.angles_deg[step], plan.angles_deg[step + 1], plan.speeds_deg_s[step + 1]
         ):  # fmt: skip

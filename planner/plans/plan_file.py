@@ -19,6 +19,7 @@ from planner.plans.problem import Problem
 from planner.plans.verification import verify
 from planner.table.cost import PathCost, Weights
 from planner.table.motion import Limits
+from protocol.command_line import program_name
 from protocol.data_file import DataFileError, read_json
 from protocol.software_version import software_version
 from protocol.whole_file import write_whole
@@ -30,7 +31,7 @@ _DECIMALS = 9
 
 
 class PlanFileError(PlannerError):
-    """A file that cannot be read, holds no plan, or is damaged."""
+    """A file that cannot be read, contains no plan, or is damaged."""
 
 
 class StoredPlan(NamedTuple):
@@ -74,7 +75,9 @@ def plan_document(scan: Scan, problem: Problem, plan: Plan, motion: ArmMotion) -
             "angles_deg": plan.angles_deg.tolist(),
             "speeds_deg_s": plan.speeds_deg_s.tolist(),
             "accelerations_deg_s2": plan.accelerations_deg_s2.tolist(),
-            "pauses": [pause._asdict() for pause in plan.pauses],
+            "pauses": [
+                {key: value for key, value in pause._asdict().items() if value is not None} for pause in plan.pauses
+            ],
             **({"waits": [wait._asdict() for wait in plan.waits]} if plan.waits else {}),
         },
         "joints_deg": _rounded(motion.robot_deg),
@@ -119,7 +122,7 @@ def load_plan(file: Path) -> StoredPlan:
     except DataFileError as error:
         raise PlanFileError(str(error)) from error
     if not isinstance(document, dict) or document.get("format") != _FORMAT:
-        raise PlanFileError(f"{file}: holds no plan that this program has written")
+        raise PlanFileError(f"{file}: contains no plan of this program")
     if document.get("format_version") != _FORMAT_VERSION:
         raise PlanFileError(f"{file}: is not a plan of format version {_FORMAT_VERSION}")
     try:
@@ -130,7 +133,7 @@ def load_plan(file: Path) -> StoredPlan:
         raise PlanFileError(f"{file}: is damaged: {error}") from error
     plan = stored.plan
     if not len(plan.angles_deg) == len(plan.speeds_deg_s) == len(plan.accelerations_deg_s2) + 1:
-        raise PlanFileError(f"{file}: is damaged: angles, speeds and accelerations do not belong together")
+        raise PlanFileError(f"{file}: is damaged: angles, speeds and accelerations are inconsistent")
     return stored
 
 
@@ -139,7 +142,7 @@ def _stored(file: Path, document: dict[str, Any]) -> StoredPlan:
     if "arm" not in document:
         raise PlanFileError(
             f"{file}: does not contain the arm, so its limits cannot be checked (an earlier version wrote it);"
-            f" create the plan again: python -m planner plan {scan} --out {file.parent}"
+            f" create the plan again: {program_name('planner')} plan {scan} --out {file.parent}"
         )
     table, cost = document["table"], document["cost"]
     return StoredPlan(

@@ -70,9 +70,11 @@ def draw_motion(speed: Axes, acceleration: Axes, problem: Problem, plan: Plan) -
         for bound in (-limit, limit):
             axes.axhline(bound, **LIMIT)
         mark_pauses(axes, plan.pauses)
+    if plan.pauses:
+        speed.legend(loc="upper right")
 
 
 def mark_pauses(axes: Axes, pauses: tuple[Pause, ...]) -> None:
     """Mark the steps in which the table turns while the arm is retracted."""
-    for pause in pauses:
-        axes.axvline(pause.step + 0.5, color=SKY, linewidth=1.0)
+    for number, pause in enumerate(pauses):
+        axes.axvline(pause.step + 0.5, color=SKY, linewidth=1.0, label="_" if number else "pause")

@@ -146,16 +146,18 @@ def _calibration(scanned: Scanned) -> str:
         return paragraph("The placements of the scan file were assumed to be exact.")
     wrong = f"{probe.wrong_starts} of {probe.starts} starts ended in a false minimum"
     radius = f"the sphere's radius fits as {probe.fitted_radius_mm:.4f} ± {probe.radius_uncertainty_mm:.4f} mm"
+    head = ("", "from", "residual, rms (µm)", "position, sigma (µm)", "angle, sigma (mdeg)", "moves a point by (µm)")
     rows = [
-        ("table axis", _um(axis.rms_mm), f"{len(axis.residuals_mm)} sphere centers", *_uncertainty(axis), ""),
-        ("probe on the flange", _um(probe.rms_mm), f"{len(probe.residuals_mm):,} points", *_uncertainty(probe),
-         f"residual {probe.noise_ratio:.2f} times the noise; {radius}; {wrong}"),
-    ]  # fmt: skip
-    return table(("", "residual, rms (µm)", "from", "uncertainty (1 sigma)", "moves a point by", ""), rows, words=True)
+        ("table axis", f"{len(axis.residuals_mm)} sphere centers", *_uncertainty(axis)),
+        ("probe on the flange", f"{len(probe.residuals_mm):,} points", *_uncertainty(probe)),
+    ]
+    note = f"Probe: the residual is {probe.noise_ratio:.2f} times the noise; {radius}; {wrong}."
+    return table(head, rows) + paragraph(note)
 
 
-def _uncertainty(found: AxisCalibration | ProbeCalibration) -> tuple[str, str]:
-    return f"{_um(found.uncertainty_mm)} µm, {1e3 * found.uncertainty_deg:.1f} mdeg", f"{_um(found.point_error_mm)} µm"
+def _uncertainty(found: AxisCalibration | ProbeCalibration) -> tuple[str, ...]:
+    sigmas = _um(found.uncertainty_mm), f"{1e3 * found.uncertainty_deg:.1f}"
+    return _um(found.rms_mm), *sigmas, _um(found.point_error_mm)
 
 
 def _profiles(scanned: Scanned) -> Iterator[tuple[str, str]]:

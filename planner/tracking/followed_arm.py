@@ -62,7 +62,7 @@ class FollowedArm:
 def _continue_turns(
     start: FloatArray, joints: FloatArray, lower: FloatArray, upper: FloatArray, most: FloatArray
 ) -> bool:
-    """Put joints (n, 6), in place, on the turns nearest those before; tell whether the arm can follow from a start.
+    """Put joints (n, 6), in place, on the turns nearest those before; return whether the arm can follow from a start.
 
     Args:
         start: (6,) where the arm is.

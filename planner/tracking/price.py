@@ -29,6 +29,8 @@ class Price(NamedTuple):
 
 def price_of_not_knowing(problem: Problem, plan: Plan) -> Price:
     """Return the price of a tracked path over its whole map."""
+    if any(pause.configuration is not None for pause in plan.pauses):
+        return Price(plan.cost.total, None, None)  # a plan has one configuration
 
     def cost(asked: Problem) -> float | None:
         outcome = dynamic_programming(asked)

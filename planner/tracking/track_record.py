@@ -8,6 +8,7 @@ import numpy as np
 
 from planner.arrays import CodeArray, FloatArray
 from planner.execution.table_motion import Phase
+from planner.kinematics.configuration import Configuration
 from planner.plans.plan import Pause, Wait
 from planner.tracking.online_planner import Kind, State, Step, Why
 from planner.tracking.tracker import Column, Tracked
@@ -20,16 +21,17 @@ class TrackRecord:
     """What a tracker did; columns go to a file, so that memory grows by some numbers a step only.
 
     Attributes:
+        configuration: of the arm at the start.
         decision_s: how long each step's decision took, with its new columns and its command.
         whys: how many steps were chosen for which reason.
         moments: some decisions.
         T_WS: the locations that were revealed.
     """
 
-    def __init__(self, folder: Path, start: State) -> None:
+    def __init__(self, folder: Path, start: State, configuration: Configuration) -> None:
         """Record from a start; columns are kept in an unnamed file in `folder`."""
         self._file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 - as long as the record
-        self._start = start
+        self.configuration = configuration
         self._angle_count = 0
         self._motion = array("d", [start.angle_deg, 0.0, 0.0])
         self._joints: list[FloatArray] = [] if start.joints is None else [start.joints]
@@ -69,7 +71,8 @@ class TrackRecord:
             self._waits[location] = self._waits.get(location, 0.0) + leg.duration_s
             return
         if step.kind is Kind.PAUSE:
-            self._pauses.append(Pause(step.start.location, step.start.angle_deg, step.end.angle_deg))
+            changed = tracked.configuration.label if tracked.recounted else None
+            self._pauses.append(Pause(step.start.location, step.start.angle_deg, step.end.angle_deg, changed))
         self._motion.extend((step.end.angle_deg, step.end.speed_deg_s, step.acceleration_deg_s2))
         if step.end.joints is not None:
             self._joints.append(step.end.joints)

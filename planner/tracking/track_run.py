@@ -157,7 +157,7 @@ def _tracked(job: _Job, progress: Progress | None) -> Finished:
             began_s, wall_began_s = table.clock.now_s(), time.perf_counter()
             turns = _turns(job.start, resting_deg(table, job.wire), run.arm_is_away)
             known, record = tracker.begin(job.start, turns), Record()
-            observer = stack.enter_context(closing(TrackRecord(job.out, tracker.state)))
+            observer = stack.enter_context(closing(TrackRecord(job.out, tracker.state, tracker.configuration)))
             for column in known:
                 observer.revealed(column)
             bring_to(table, tracker.motion.start_deg, limits, job.wire)
@@ -187,7 +187,7 @@ def _written(job: _Job, observer: TrackRecord, record: Record) -> tuple[RunVerif
         raise TrackError(record.failure or "the scan ended at its first location")
     out, run, tracker = job.out, job.options.run, job.tracker
     problem, plan, motion, scan = tracked_plan(job.scan, tracker, observer)
-    save_maps(out / MAP_FILE, {tracker.configuration: problem.map})
+    save_maps(out / MAP_FILE, {observer.configuration: problem.map})
     save_plan(out / PLAN_FILE, plan_document(scan, problem, plan, motion))
     run_input = load_run_input(out / PLAN_FILE)
     conditions = RunConditions(run.port, job.wire, run.lead_s, run.tolerance_deg, 0, run.pause_times, run.run_on_deg)

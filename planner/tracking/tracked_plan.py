@@ -27,7 +27,7 @@ def tracked_plan(scan: Scan, tracker: Tracker, observer: TrackRecord) -> tuple[P
     T_WS = np.stack(observer.T_WS[: observer.location_count])
     scan = replace(scan, predefined_path=ScanPath(T_WS, scan.path.step_s))
     values, reasons = observer.columns()
-    configuration = tracker.configuration
+    configuration = observer.configuration
     metadata = dict(tracker.map_metadata(T_WS)) | {"configuration": configuration.label}
     map_ = ConfigurationMap(values, reasons, metadata=metadata)
     arm = arm_on_path(scan, configuration)

@@ -130,12 +130,14 @@ class Tracked(NamedTuple):
         step: the step that was taken for it; None where the command belongs to the step before.
         targets: where the arm is to be in that step.
         recounted: after a change of configuration, the columns ahead in the new one.
+        configuration: of the arm from the end of the step on.
     """
 
     command: TimedCommand
     step: Step | None
     targets: tuple[JointTarget, ...]
-    recounted: tuple[Column, ...] = ()
+    recounted: tuple[Column, ...]
+    configuration: Configuration
 
 
 class _Known(NamedTuple):
@@ -344,7 +346,7 @@ class Tracker(FollowedReference):
                 self._pieces.extend(pieces_of_leg(leg, self._limits, spacing, self._settings.run_on_deg))
             targets = () if step is None else self._targets(step, legs)
         recounted, self._recounted = self._recounted, ()
-        return Tracked(self._command(self._pieces.popleft()), step, targets, recounted)
+        return Tracked(self._command(self._pieces.popleft()), step, targets, recounted, self.configuration)
 
     def _next_legs(self, now_s: float) -> tuple[Step | None, tuple[Leg, ...]]:
         """Take the next step, or stop where the path ends."""

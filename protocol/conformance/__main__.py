@@ -18,8 +18,8 @@ from protocol.conformance.results.record import RecordError
 from protocol.ending import ended
 
 _EXAMPLE = """examples:
-  python -m protocol.conformance --port emulator:// --out build/conformance
-  python -m protocol.conformance --port /dev/ttyUSB0 --profile table.toml --case 7 --case 4.2/3 --out record
+  {conform} --port emulator:// --out build/conformance
+  {conform} --port /dev/ttyUSB0 --profile table.toml --case 7 --case 4.2/3 --out record
 
 Exit status: 0 when no case failed, 1 when one did, 2 when the table could not be tested, 130 after Ctrl-C
 (and 128 and its number after another signal).
@@ -30,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     options = parser().read(arguments)
     expected = UsageError, ProfileError, RecordError, SessionError, BenchError
-    return ended("conformance", lambda: _run(options), *expected)
+    return ended(program_name("protocol.conformance"), lambda: _run(options), *expected)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -55,7 +55,7 @@ def parser() -> Parser:
     parser = Parser(
         prog=program_name("protocol.conformance"),
         description="Test a rotary table against the specification, clause by clause.",
-        epilog=_EXAMPLE,
+        epilog=_EXAMPLE.format(conform=program_name("protocol.conformance")),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add = parser.add_argument

@@ -35,6 +35,7 @@ def test_a_plan_is_one_value_that_cannot_change_and_can_be_saved_and_run(tmp_pat
     options = planner.RunOptions("elsewhere", arm_is_away=True)
     finished = planner.run(planned.save(tmp_path / "plan"), "emulator://", tmp_path / "run", options)
     assert finished.checked.is_verified
+    assert "<h1>Run of cylinder</h1>" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     assert (tmp_path / "run" / "plan.json").read_bytes() == (tmp_path / "plan" / "plan.json").read_bytes()
 
 

@@ -107,6 +107,12 @@ def test_where_nobody_listens_no_channel_is_opened(path: str, folder: Path) -> N
         ControlChannel(folder / path)
 
 
+def test_a_system_without_unix_sockets_has_no_channel(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr("socket.AF_UNIX")
+    with pytest.raises(BenchError, match="this system has no Unix sockets"):
+        ControlChannel(folder / "control")
+
+
 @pytest.mark.parametrize(
     "reply",
     [

@@ -139,23 +139,16 @@ def test_code_is_compiled_once_and_again_only_when_it_has_changed(checkout: Chec
     assert other.run() == (20.0, 2)
 
 
-def test_a_damaged_file_is_replaced(checkout: Checkout) -> None:
-    checkout.run()
+def test_a_file_that_is_damaged_or_holds_something_else_is_replaced(checkout: Checkout) -> None:
+    assert checkout.run() == (13.0, 2)
     [file] = kept_files(checkout)
     whole = file.read_bytes()
-    file.write_bytes(whole[: len(whole) // 2])
-    assert checkout.run() == (13.0, 2)
-    assert len(file.read_bytes()) > len(whole) // 2
-    assert checkout.run() == (13.0, 0)
-
-
-def test_whole_files_of_something_else_are_replaced(checkout: Checkout) -> None:
-    assert checkout.run() == (13.0, 2)
-    [file] = kept_files(checkout)
-    for content in (b"no pickle", pickle.dumps(()), pickle.dumps((None,) * 9)):
-        seal = kept_file._seal(file.name, content)  # noqa: SLF001  # what an older version may have written
-        file.write_bytes(seal + content)
+    others = [b"no pickle", pickle.dumps((None,) * 9)]
+    sealed = [kept_file._seal(file.name, other) + other for other in others]  # noqa: SLF001  # as another version may
+    for content in (whole[: len(whole) // 2], *sealed):
+        file.write_bytes(content)
         assert checkout.run() == (13.0, 2)
+        assert len(file.read_bytes()) > len(whole) // 2
     assert checkout.run() == (13.0, 0)
 
 

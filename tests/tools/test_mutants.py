@@ -62,6 +62,6 @@ def test_the_same_seed_gives_the_same_mutants(
 ) -> None:
     monkeypatch.setattr(mutants, "verdict_in_a_process", lambda index, _seed: f"caught {index}")
     for _ in range(2):
-        assert main(["--count", "5", "--seed", "7", "--verbose"]) == 0
+        assert main(["--count", "5", "--seed", "7", "--all"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[:6] == lines[6:]

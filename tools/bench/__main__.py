@@ -19,7 +19,7 @@ SUBJECTS = (
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the named benchmarks and print their tables."""
-    options = _parser().parse_args(arguments)
+    options = parser().parse_args(arguments)
     # Each benchmark needs libraries that the others do not. An interrupt must not occur during the import of compiled
     # ones.
     benches = {subject: import_module(f"tools.bench.{subject}").bench for subject in options.subject}
@@ -41,14 +41,15 @@ def _run(options: argparse.Namespace, benches: Mapping[str, Callable[..., None]]
     return 0
 
 
-def _parser() -> Parser:
+def parser() -> Parser:
+    """Return the parser of the command line."""
     parser = Parser(
         prog=program_name("tools.bench"),
         description="Measure this machine's figures, compared with a reference.",
         epilog="examples:\n  python -m tools.bench emulator map\n  python -m tools.bench identify --pty",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("subject", choices=SUBJECTS, nargs="+")
+    parser.add_argument("subject", choices=SUBJECTS, nargs="+", help=f"what is measured, of {', '.join(SUBJECTS)}")
     adaptive = parser.add_argument_group("for adaptive")
     adaptive.add_argument(
         "--scan", metavar="SCAN", action="append", default=[], help="a scan file (default: all shipped scans)"

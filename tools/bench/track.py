@@ -76,7 +76,7 @@ def track(
     sent_by: Callable[[int], int] = lambda _: sys.maxsize,
     keep: bool = True,
 ) -> Track:
-    """Track a path in simulated time, without a table; `sent_by` says how many locations came by a step."""
+    """Track a path in simulated time, without a table; `sent_by` returns the number of locations sent by a step."""
     tracker = Tracker(
         map_problem(scan), scan.path.step_s, scan.limits, scan.weights, Wire(), settings, [_CONFIGURATION]
     )
@@ -147,7 +147,7 @@ def _ms(times_s: list[float]) -> tuple[str, ...]:
 
 
 def _longer(scan: Scan, count: int) -> FloatArray:
-    """Return a scan's path to and fro until it has so many locations."""
+    """Return a scan's path back and forth until it has the given number of locations."""
     path = scan.path.T_WS
     there_and_back = np.concatenate((path, path[-2:0:-1]))
     return there_and_back[np.arange(count) % len(there_and_back)]

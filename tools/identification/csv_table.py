@@ -1,6 +1,7 @@
 """CSV files as written by programs and spreadsheets: byte order mark, separator, case of the names, decimal comma."""
 
 import csv
+import logging
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
@@ -8,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tools.identification.errors import RecordingError
+
+_log = logging.getLogger(__name__)
 
 _SEPARATORS = ",;\t"
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
@@ -88,6 +91,7 @@ def check_decimals(table: Table, names: Iterable[str]) -> None:
 
 def _text(path: Path) -> str:
     data = path.read_bytes()
+    _log.debug("read %s, %d bytes", path, len(data))
     if data.startswith(_UTF_16):
         raise RecordingError(f"{path}: is UTF-16 text; save it as CSV in UTF-8")
     try:

@@ -7,10 +7,13 @@ from importlib import import_module
 from seventh_axis.__main__ import COMMANDS
 from tools.reference.markdown import code, table
 
+_IN_THE_WHEEL = ("tools.demo", "tools.figures")
+_IN_A_CLONE = ("tools.bench.__main__", "tools.soak", "tools.mutants", "tools.mutation_score")
+
 
 def programs() -> dict[str, argparse.ArgumentParser]:
-    """Return the parser of every program that `seventh-axis` starts, by its module without `__main__`."""
-    modules = dict.fromkeys(command.module for command in COMMANDS.values())
+    """Return the parser of every program, by its module without `__main__`: first those of `seventh-axis`."""
+    modules = (*dict.fromkeys(command.module for command in COMMANDS.values()), *_IN_THE_WHEEL, *_IN_A_CLONE)
     return {module.removesuffix(".__main__"): import_module(module).parser() for module in modules}
 
 
@@ -22,8 +25,12 @@ def command_pages() -> dict[str, str]:
 def page(module: str, parser: argparse.ArgumentParser) -> str:
     """Return a program's page; each of its commands has a section."""
     names = [name for name, command in COMMANDS.items() if command.module.removesuffix(".__main__") == module]
-    also = ", ".join(code(f"seventh-axis {name}") for name in names)
-    parts = [f"# {parser.prog}", f"The same program: {also}.", *_section(parser)]
+    parts = [f"# {parser.prog}"]
+    if names:
+        parts.append(f"The same program: {', '.join(code(f'seventh-axis {name}') for name in names)}.")
+    if module in {each.removesuffix(".__main__") for each in _IN_A_CLONE}:
+        parts.append("It needs a clone: the wheel does not contain it.")
+    parts += _section(parser)
     for name, command in subcommands(parser).items():
         parts += [f"## {name}", *_section(command)]
     return "\n\n".join(parts) + "\n"

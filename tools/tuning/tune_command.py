@@ -8,6 +8,8 @@ from math import inf
 from pathlib import Path
 
 from emulator.config.table_config import load_config
+from protocol.color import colored
+from protocol.command_line import program_name
 from protocol.page import Origin
 from protocol.progress import share_shown
 from protocol.whole_file import whole_file
@@ -57,7 +59,7 @@ def _judge(options: argparse.Namespace) -> int:
         tuning = judge(config, gains, terms, progress)
     _write(folder, tuning, options.command_line)
     _print(tuning)
-    print(verdict(tuning))
+    print(colored(verdict(tuning), "good" if tuning.feasible else "bad", sys.stdout))
     return 0 if tuning.feasible else 1
 
 
@@ -76,7 +78,7 @@ def _refusal(tuning: Tuning, options: argparse.Namespace) -> str:
 
 def _command_line(options: argparse.Namespace, limits: Limits) -> str:
     """Return the command line with other limits."""
-    words = ["python", "-m", "tools.tune"]
+    words = program_name("tools.tune").split()
     if options.out is not None:
         words += ["--out", str(options.out)]
     if options.config is not None:

@@ -52,7 +52,10 @@ def _summary(tuning: Tuning) -> str:
 
 def _change(old: float, new: float) -> str:
     """Return by how much a figure changed, in percent of what it was."""
-    return f"{100.0 * (new / old - 1.0):+.0f} %" if old > 0.0 and np.isfinite((old, new)).all() else ""
+    if not (old > 0.0 and np.isfinite((old, new)).all()):
+        return ""
+    percent = round(100.0 * (new / old - 1.0))
+    return f"{percent:+d} %" if percent else "0 %"
 
 
 def verdict(tuning: Tuning) -> str:
@@ -162,7 +165,7 @@ def _gains_table(tuning: Tuning) -> str:
     for tuned in tuning.sets.values():
         for when, gains in zip(tuning.words, (tuned.before, tuned.design.gains), strict=True):
             rows.append((f"{tuned.title}, {when}", *_gain_cells(tuning, gains)))
-    head = ("", "K (duty s/deg)", "Ti (ms)", "Td (ms)", "proportional", "integral", "derivative")
+    head = ("", "K (duty s/deg)", "Ti (ms)", "Td (ms)", "P register", "I register", "D register")
     return table(head, rows)
 
 

@@ -1,10 +1,13 @@
 """Read and write lines with their times, and record every byte."""
 
+import logging
 from itertools import pairwise
 from typing import Literal, NamedTuple, Protocol
 
 from protocol.clock import Clock, clock_of
 from protocol.port import Port
+
+_log = logging.getLogger(__name__)
 
 CR = b"\r"
 
@@ -68,10 +71,13 @@ class RecordedPort:
                 self.events[-1] = last._replace(data=last.data + data)
             else:
                 self.events.append(Event(self.clock.now_s(), "received", data))
+            if data.endswith(CR):
+                _log.debug("received %r", self.events[-1].data)
         return data
 
     def write(self, data: bytes, /) -> int | None:
         """Send all of `data`."""
+        _log.debug("sent %r", data)
         self.events.append(Event(self.clock.now_s(), "sent", data))
         return self.inner.write(data)
 

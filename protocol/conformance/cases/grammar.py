@@ -30,7 +30,8 @@ def a_letter_begins_a_line(rig: Rig) -> None:
     """Send every other printable byte alone, each letter with a number, and words."""
     others = [byte for byte in _PRINTABLE if byte not in _LETTERS]
     numbered = [byte + b" 1" for byte in others if byte.isalpha()]
-    for line in (*others, *numbered, b" H", b"p 10", b"OK", b"ERR 1", b"VER", b"*IDN?", b"$H"):
+    words = [word for word in (b" H", b"p 10", b"OK", b"ERR 1", b"VER", b"*IDN?", b"$H") if word[:1] not in _LETTERS]
+    for line in (*others, *numbered, *words):
         rig.refused(line, ErrorCode.UNKNOWN_COMMAND)
 
 

@@ -3,6 +3,7 @@
 import sys
 
 from protocol import ending
+from protocol.command_line import program_name, report, report_error
 from protocol.conformance.bench.ports import is_simulated
 from protocol.conformance.bench.wire import ReopenablePort
 from protocol.conformance.profile.profile import Profile
@@ -15,7 +16,12 @@ class UsageError(Exception):
 
 def say(sentence: str) -> None:
     """Print a line for the user, if the output is a terminal."""
-    ending.say("conformance", sentence)
+    report(program_name("protocol.conformance"), sentence)
+
+
+def say_error(problem: str) -> None:
+    """Print in one line what is wrong."""
+    report_error(program_name("protocol.conformance"), problem)
 
 
 def tell(text: str) -> None:

@@ -3,19 +3,22 @@
 import argparse
 import os
 import shlex
+import sys
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
 
 from protocol.clock import WallClock
+from protocol.color import colored
+from protocol.command_line import program_name
 from protocol.conformance.bench.host_watch import watch_in
 from protocol.conformance.bench.ports import described, is_simulated
 from protocol.conformance.bench.stand import stand_beside
 from protocol.conformance.bench.wire import RecordedPort, ReopenablePort
 from protocol.conformance.cases.case import Case
 from protocol.conformance.cases.catalog import only
-from protocol.conformance.commands.command_line import UsageError, confirm, say, show_progress, tell
+from protocol.conformance.commands.command_line import UsageError, confirm, say, say_error, show_progress, tell
 from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import Profile
 from protocol.conformance.results.record import Header, count_verdicts, write_junit, write_record
@@ -57,9 +60,11 @@ def run_suite(options: argparse.Namespace, profile: Profile, port: ReopenablePor
         except KeyboardInterrupt as interrupt:
             status = status_after(interrupt)
             say(f"interrupted after {len(outcomes)} of {len(cases)} cases; {session.how_it_was_left}")
-    tell(", ".join(f"{count} {verdict}" for verdict, count in count_verdicts(outcomes).items()) or "no case was run")
+    is_good = not any(outcome.verdict in _BAD for outcome in outcomes)
+    counts = ", ".join(f"{count} {verdict}" for verdict, count in count_verdicts(outcomes).items())
+    tell(colored(counts, "good" if is_good else "bad", sys.stdout) if counts else "no case was run")
     written = _write(options, header, outcomes, durations_s, junit)
-    return status or (int(any(outcome.verdict in _BAD for outcome in outcomes)) if written else _NO_FILES)
+    return status or (int(not is_good) if written else _NO_FILES)
 
 
 def _junit_file(options: argparse.Namespace) -> Path:
@@ -99,7 +104,7 @@ def _is_done(write: Callable[[], None]) -> bool:
     try:
         write()
     except OSError as error:
-        say(str(error))
+        say_error(str(error))
         return False
     return True
 
@@ -124,7 +129,7 @@ def _progress(
         for run in outcome.spoiled:
             say(f"{outcome.case.id} was run again, since {run}")
         if outcome.verdict is not Verdict.PASS:
-            tell(f"{outcome.verdict:9} {outcome.case.id}: {outcome.reason}")
+            tell(f"{_colored(outcome.verdict)} {outcome.case.id}: {outcome.reason}")
         if outcome.verdict in _BAD:
             tell(f"          {outcome.case.clause.level}: {outcome.case.clause.text}")
             tell(f"          To repeat: {_repeat(options, outcome.case)}")
@@ -134,9 +139,13 @@ def _progress(
     return take
 
 
+def _colored(verdict: Verdict) -> str:
+    return colored(f"{verdict:9}", "bad", sys.stdout) if verdict in _BAD else f"{verdict:9}"
+
+
 def _repeat(options: argparse.Namespace, case: Case) -> str:
     """Return the command that repeats one case alone."""
-    words = ["python", "-m", "protocol.conformance", "--port", options.port]
+    words = [*program_name("protocol.conformance").split(), "--port", options.port]
     for name in ("profile", "control"):
         if getattr(options, name) is not None:
             words += [f"--{name}", str(getattr(options, name))]

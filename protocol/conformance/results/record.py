@@ -5,13 +5,13 @@ import math
 import platform
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 from xml.etree import ElementTree as ET
 
+from protocol import whole_file
 from protocol.conformance.bench.wire import Event
 from protocol.conformance.judgement.reference import Expectation, MotionRecord, Sample
 from protocol.conformance.judgement.verdict import Measurement, Verdict
@@ -157,20 +157,14 @@ def write_junit(path: Path, header: Header, outcomes: Sequence[Outcome], duratio
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a file under a temporary name, and rename it when it is complete. Unwritable characters are escaped.
+    """Write a file that appears when it is whole; unwritable characters are escaped.
 
     Raises:
         OSError: the file cannot be written; nothing remains of it.
     """
-    partial = path.with_name(path.name + ".part")
     try:
-        partial.unlink(missing_ok=True)  # left by an interrupted run
-        with partial.open("x", encoding="utf-8") as file:
-            file.write(_UNWRITABLE.sub(_escaped, text))
-        partial.replace(path)
+        whole_file.write_whole(path, _UNWRITABLE.sub(_escaped, text))
     except OSError as error:
-        with suppress(OSError):
-            partial.unlink()
         raise OSError(f"{path}: cannot write: {error.strerror}") from error
 
 

@@ -1,5 +1,6 @@
 """A session with a table: run the cases one after the other, each from rest to rest."""
 
+import logging
 import traceback
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
@@ -19,6 +20,8 @@ from protocol.conformance.judgement.verdict import InapplicableError, Measuremen
 from protocol.conformance.profile.profile import Profile
 from protocol.conformance.session.first_contact import CANCEL, PATIENCE_S, SETTLE_S, resting_position
 from protocol.errors import TableError
+
+_log = logging.getLogger(__name__)
 
 __all__ = ["Outcome", "Session", "SessionError", "session_at"]
 
@@ -96,6 +99,7 @@ class Session:
 
         An interrupt stops the table, as in `run`.
         """
+        _log.debug("case %s", case.id)
         lacking = self._lacking(case)
         if lacking:
             return Outcome(case, Verdict.SKIPPED, lacking)

@@ -55,7 +55,7 @@ def test_any_bytes_and_triggers_have_the_same_replies_and_duties(name: str, data
     [
         b"P 4194303.998046875",  # the last position
         b"P 4194303.9990234375",  # half a count more: to the even one, which is out of range
-        b"P 0.00000000001455191522836685180664",  # a hair below half of the least unit
+        b"P 0.00000000001455191522836685180664",  # slightly below half of the smallest unit
         b"R 4194304",
         b"R 4194304.00000000000000001",
         b"S 40.0000000000000000000000",

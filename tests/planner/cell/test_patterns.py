@@ -1,5 +1,7 @@
 """The properties of every pattern, checked on the workpiece's mesh instead of the pattern's own formulas."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -8,7 +10,8 @@ from planner.arrays import FloatArray
 from planner.cell.cell import Probe
 from planner.cell.patterns import PATTERNS, StripLayout
 from planner.cell.scan_path import at_scan_speed
-from planner.cell.workpiece import Block, Cylinder, Mould, Sphere, Workpiece
+from planner.cell.workpiece import CLASSES, Block, Cylinder, Mould, Sphere, Workpiece
+from planner.defaults import PART_CLASSES, PATTERN_NAMES
 
 PROBE = Probe()
 LAYOUT = StripLayout()
@@ -19,6 +22,16 @@ WORKPIECES: dict[str, Workpiece] = {
     "mould": Mould(300.0, 200.0, 80.0, 240.0, 140.0, 50.0, middle_mm=(5.0, -10.0, 20.0)),
 }
 ALL = [(kind, pattern) for kind, patterns in PATTERNS.items() for pattern in patterns]
+
+
+def test_the_command_line_and_the_docs_know_every_pattern() -> None:
+    assert {*PATTERN_NAMES} == {pattern for _, pattern in ALL}
+    page = (Path(__file__).parents[3] / "docs" / "own-part.md").read_text(encoding="utf-8")
+    assert not [pattern for pattern in PATTERN_NAMES if f"`{pattern}`" not in page]
+
+
+def test_the_command_line_knows_every_class() -> None:
+    assert {*PART_CLASSES} == {*CLASSES} == {*PATTERNS}
 
 
 def waypoints_of(kind: str, pattern: str, layout: StripLayout = LAYOUT) -> FloatArray:

@@ -19,7 +19,7 @@ def test_a_run_is_not_begun_with_an_option_that_cannot_be_meant(
     with pytest.raises(SystemExit) as exit_status:
         main(["run", "plan.json", "--port", "emulator://", "--out", "run", *option])
     assert exit_status.value.code == 2
-    assert f"argument {option[0]}: is {option[1]}; allowed:" in capsys.readouterr().err
+    assert f"{option[0]}: is {option[1]}; allowed:" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

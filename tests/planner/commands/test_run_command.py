@@ -47,7 +47,7 @@ def test_a_run_is_verified_and_leaves_its_files(
     assert run(plan_file, out) == 0
     shown = capsys.readouterr()
     assert shown.out.startswith("verified: within 0.")
-    said = re.fullmatch(r"(.*) s of table time in (.*) s: (.*) times real time\n", shown.err)
+    said = re.fullmatch(r"(.*) s of table time in (.*) s: (.*) times real time\nthe report is .+\n", shown.err)
     assert said is not None
     table_s, wall_s, times_real = map(float, said.groups())
     assert table_s == pytest.approx(result_in(out)["commands"][-1]["time_s"], abs=3.0)
@@ -80,6 +80,7 @@ def test_run_and_show_write_one_page_with_everything_in_it(plan_file: Path, tmp_
     shown = (tmp_path / "shown.html").read_text(encoding="utf-8")
     assert shown.partition("<footer>")[0] == page.partition("<footer>")[0]
     assert f"<code>python -m planner run {plan_file} " in page
+    assert result_in(out)["conditions"]["begun"] is None  # in simulated time
     assert result_in(out)["verdict"] in page
     assert page.count('<svg role="img" aria-label="') == page.count("<svg") == 3
     assert not re.search("https?://(?!www.w3.org/)", page)
@@ -151,3 +152,5 @@ def test_a_real_port_gets_the_same_commands_and_the_same_verdict(plan_file: Path
     assert all(one["command"] == other["command"] for one, other in same)
     assert real["verified"]
     assert not real["missing_triggers"]
+    page = (tmp_path / "real" / "report.html").read_text(encoding="utf-8")
+    assert f"&middot; {real['conditions']['begun']} &middot; <code>" in page

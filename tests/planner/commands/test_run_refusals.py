@@ -119,7 +119,10 @@ REFUSED: dict[str, tuple[Change, str]] = {
         lambda plan: plan["cell"]["T_BT"][0].__setitem__(3, 10**400),
         "is damaged: OverflowError",
     ),
-    "an angle that is none": (lambda plan: plan["table"]["angles_deg"].__setitem__(0, 10**400), "contains no plan of"),
+    "an angle that is none": (
+        lambda plan: plan["table"]["angles_deg"].__setitem__(0, 10**400),
+        "is damaged: OverflowError",
+    ),
     "a limit that is missing": (lambda plan: plan["limits"].pop("speed_deg_s"), "is damaged: KeyError, 'speed_deg_s'"),
     "no poses": (lambda plan: plan.pop("locations"), "is damaged: KeyError, 'locations'"),
 }

@@ -86,7 +86,7 @@ def test_a_program_that_dies_leaves_the_table_at_rest_and_what_was_done_recorded
     assert track(scan_file, out, "--poses", "-") == 2
     shown = capsys.readouterr()
     assert 'stopped: stdin: ended without the line "end", at 15 locations' in shown.out
-    assert f"what was recorded until then is in {out}" in shown.err
+    assert f"the data recorded so far is in {out}" in shown.err
     assert document_in(out, "plan.json")["table"]["speeds_deg_s"][-1] == 0.0
     assert document_in(out, "run.json")["forbidden_steps"] == []
     assert document_in(out, "track.json")["locations"]["reached"] <= 15

@@ -155,7 +155,7 @@ def test_what_does_not_fit_the_wire_is_refused_with_a_step_that_does() -> None:
         StreamError, match=r"at 9600 baud.* previous step takes 40 ms; use a time step of at least 0\.\d+ s"
     ) as refusal:
         check_it_fits(stream(quick, LIMITS, wire), wire)
-    fitting_s = float(str(refusal.value).split("a time step of ")[1].split()[0])
+    fitting_s = float(str(refusal.value).split("at least ")[1].split()[0])
     slow = TableMotion(random_plan(generator, fitting_s, 2.0, LIMITS), LIMITS)
     check_it_fits(stream(slow, LIMITS, wire), wire)
     check_it_fits(stream(quick, LIMITS, Wire(baud=115_200)), Wire(baud=115_200, turnaround_s=0.001))

@@ -28,6 +28,24 @@ def can_cross(problem: Problem, speeds: list[float], column: int, angle_deg: flo
     return False
 
 
+@pytest.mark.parametrize(
+    ("limits", "speeds_per_gain", "start_deg_s", "speeds_deg_s"),
+    [
+        (Limits(40.0, 40.0), 2, None, np.arange(-40.0, 41.0, 10.0)),  # 20 deg/s in a step, in halves
+        (Limits(40.0, 100.0), 2, None, np.arange(-40.0, 41.0, 20.0)),  # the limit is less than the change in a step
+        (Limits(45.0, 40.0), 1, None, [-45.0, -40.0, -20.0, 0.0, 20.0, 40.0, 45.0]),
+        (Limits(40.0, 40.0), 1, 7.77, [-40.0, -20.0, 0.0, 7.77, 20.0, 40.0]),
+        (Limits(40.0, 40.0), 1, -20.0, [-40.0, -20.0, 0.0, 20.0, 40.0]),
+    ],
+)
+def test_the_speeds_are_multiples_of_a_share_of_what_a_step_changes(
+    limits: Limits, speeds_per_gain: int, start_deg_s: float | None, speeds_deg_s: list[float]
+) -> None:
+    free = ConfigurationMap(np.ones((20, 36)))
+    problem = Problem(free, 0.5, limits, start_speed_deg_s=start_deg_s)
+    assert speeds_of(problem, speeds_per_gain) == pytest.approx(speeds_deg_s)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_an_angle_is_crossable_exactly_if_some_sequence_of_the_speeds_crosses_from_it(seed: int) -> None:
     family = MapFamily(0.45, 1.0, location_count=5, angle_count=20)

@@ -3,20 +3,26 @@
 import gc
 import sys
 from dataclasses import replace
+from pathlib import Path
 from types import FunctionType, ModuleType
 
 import numpy as np
 import pytest
 
 from planner.arrays import FloatArray
+from planner.cell.scan import load_scan
+from planner.execution.run import RunOptions
+from planner.execution.run_file import load_run
 from planner.execution.stream import reference_states
 from planner.execution.table_motion import Phase
 from planner.kinematics.arm import Arm
 from planner.kinematics.joint_limits import first_joint_fault
+from planner.kinematics.value import RatedPoses, UserFactor
 from planner.table.wire import StreamError
 from planner.tracking.online_planner import Kind, Step, Why
 from planner.tracking.pose_lines import SourceError
 from planner.tracking.revealed_map import WindowError
+from planner.tracking.track_run import TrackOptions, track_scan
 from planner.tracking.tracker import JointTarget, TrackError
 from tests.planner.tracking.track_examples import (
     asked,
@@ -25,6 +31,7 @@ from tests.planner.tracking.track_examples import (
     locations,
     new_tracker,
     steps_to_the_end,
+    write_scan,
 )
 
 
@@ -108,11 +115,12 @@ def test_when_the_source_dies_the_table_comes_to_rest_before_the_fault_is_raised
     tracker = begun_tracker(locations(), view=8)
     for _ in range(6):
         asked(tracker)
-    assert not tracker.state.is_at_rest
+    speed_deg_s = tracker.state.speed_deg_s
     tracker.abandon(SourceError("gone"))
     with pytest.raises(SourceError, match="gone"):
         steps_to_the_end(tracker, locations()[: tracker.count])
     assert tracker.state.is_at_rest
+    assert speed_deg_s != 0.0
     assert tracker.missed == 0
 
 
@@ -192,3 +200,31 @@ def test_a_source_of_thousands_of_locations_needs_no_more_memory_than_one_of_a_h
     assert sizes[-1] < 1.1 * sizes[0]
     assert tracker.motion.decided_s == tracker.motion.ticks * cylinder().path.step_s
     assert tracker.state.location > 300
+
+
+def test_a_location_that_another_configuration_reaches_is_reached_by_a_pause_where_that_is_allowed(
+    tmp_path: Path,
+) -> None:
+    def late(poses: RatedPoses) -> FloatArray:
+        """Allow NOFLIP at the first 12 locations, and FLIP from there on."""
+        return np.where((poses.joints[:, 4] > 0.0) == (poses.locations < 12), 1.0, 0.0)
+
+    def quiet(_: str) -> None:
+        """Print nothing."""
+
+    scan = load_scan(write_scan(tmp_path))
+    scan = replace(scan, value=replace(scan.value, user_factors=(UserFactor("late", late),)))
+    run = RunOptions("emulator://", arm_is_away=True)
+    options = TrackOptions(run, view=8, angle_count=72, configuration="best")
+    refused = track_scan(scan, tmp_path / "refused", options, quiet, lambda _: None)
+    assert "location 12 has no table angle" in refused.checked.verdict
+    assert "-FLIP would serve; allow that with --reconfigure" in refused.checked.verdict
+    allowed = track_scan(scan, tmp_path / "out", options._replace(reconfigure=True), quiet, lambda _: None)
+    assert allowed.checked.is_verified
+    assert allowed.tracker.reconfigurations == 1
+    stored = load_run(tmp_path / "out").run_input.plan
+    assert [(pause.step, pause.configuration) for pause in stored.pauses if pause.configuration] == [
+        (11, allowed.tracker.configuration.label)
+    ]
+    assert allowed.tracker.configuration.flip
+    assert not allowed.record.configuration.flip

@@ -1,6 +1,7 @@
 """The command `seventh-axis`: it starts the same programs as `python -m ...`, from any folder."""
 
 import os
+import re
 import subprocess
 import sys
 from importlib import import_module
@@ -22,12 +23,30 @@ def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 def test_each_command_leads_to_a_program_that_calls_itself_so(
     name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("protocol.command_line._names", [])
+    monkeypatch.setattr("protocol.command_line._names", {})
     with pytest.raises(SystemExit) as ended:
         main([name, "--help"])
     assert ended.value.code == 0
-    assert capsys.readouterr().out.startswith(f"usage: seventh-axis {name} ")
+    shown = capsys.readouterr().out
+    assert shown.startswith(f"usage: seventh-axis {name} ")
+    assert not re.findall(r"python\s+-m\s+(?:emulator|planner|protocol|tools)", shown)
+    assert "--verbose" in shown
     assert import_module(COMMANDS[name].module).parser().format_help()
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_each_module_that_is_started_by_python_calls_itself_so(name: str) -> None:
+    shown = import_module(COMMANDS[name].module).parser().format_help()
+    assert shown.startswith(f"usage: python -m {COMMANDS[name].module.removesuffix('.__main__')} ")
+    assert "seventh-axis" not in shown
+
+
+def test_the_option_for_debug_messages_may_stand_before_the_command(tmp_path: Path) -> None:
+    done = run(tmp_path, "-v", "conform", "--port", "emulator://", "--case", "7.1/1", "--out", "out")
+    assert done.returncode == 0
+    assert "protocol.conformance.session.suite: case 7.1/1\n" in done.stderr
+    assert "protocol.whole_file: wrote out/report.html\n" in done.stderr
+    assert "s protocol." not in run(tmp_path, "conform", "--list", "--case", "7.1/1").stderr
 
 
 def test_a_command_runs_and_its_status_is_passed_on(tmp_path: Path) -> None:
@@ -57,7 +76,9 @@ def test_the_version_is_that_of_the_distribution(tmp_path: Path) -> None:
     assert run(tmp_path, "version").stdout.startswith(f"seventh-axis {version('seventh-axis')} in ")
 
 
-@pytest.mark.parametrize(("words", "said"), [([], "COMMAND"), (["tabel"], "'tabel'"), (["--tabel"], "COMMAND")])
+@pytest.mark.parametrize(
+    ("words", "said"), [([], "COMMAND"), (["tabel"], "is tabel; allowed are"), (["--tabel"], "COMMAND")]
+)
 def test_what_is_no_command_is_one_line_and_status_2(words: list[str], said: str, tmp_path: Path) -> None:
     done = run(tmp_path, *words)
     assert done.returncode == 2

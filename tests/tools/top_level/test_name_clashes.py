@@ -78,7 +78,12 @@ def test_the_pty_table_is_ours_though_the_project_has_an_emulator(tmp_path: Path
 
 @pytest.mark.parametrize(
     ("file", "words"),
-    [("protocol/__init__.py", ()), ("protocol/__init__.py", ("--table-port", "pty")), ("emulator.py", ())],
+    [
+        ("protocol/__init__.py", ()),
+        ("protocol/__init__.py", ("--table-port", "pty")),
+        ("emulator.py", ()),
+        ("serial.py", ()),
+    ],
 )
 def test_the_fixture_says_in_one_sentence_what_hides_our_package(
     file: str, words: tuple[str, ...], tmp_path: Path
@@ -88,6 +93,22 @@ def test_the_fixture_says_in_one_sentence_what_hides_our_package(
     result = run_pytest(folder, *words)
     name = file.partition("/")[0].removesuffix(".py")
     hides = (folder / file).parent if "/" in file else folder / file
-    assert f"rotary_table: {hides} hides the package {name} of seventh-axis; " in result.stdout, result.stdout
+    owner = "pyserial" if name == "serial" else "seventh-axis"
+    assert f"rotary_table: {hides} hides the package {name} of {owner}; " in result.stdout, result.stdout
     assert "Traceback" not in result.stdout + result.stderr
     assert not (folder / "was-run").exists()
+
+
+@pytest.mark.parametrize("mode", ["prepend", "append", "importlib"])
+def test_each_import_mode_finds_the_projects_own_package_as_the_docs_say(mode: str, tmp_path: Path) -> None:
+    test = "import protocol\n\ndef test_it_is_mine():\n    assert protocol.NAME == 'mine'\n"
+    configuration = '[tool.pytest.ini_options]\npythonpath = ["."]\n'
+    files = {"protocol/__init__.py": "NAME = 'mine'\n", "tests/test_mine.py": test, "pyproject.toml": configuration}
+    result = run_pytest(project(tmp_path, files), f"--import-mode={mode}")
+    assert "1 passed" in result.stdout, result.stdout + result.stderr
+
+
+def test_a_library_in_the_current_folder_hides_none_of_the_fixtures(tmp_path: Path) -> None:
+    wrong = "raise SystemExit('the wrong one')\n"
+    folder = project(tmp_path, {**dict.fromkeys(("numpy.py", "control.py"), wrong), "test_mine.py": USES_THE_FIXTURE})
+    assert "1 passed" in run_pytest(folder).stdout

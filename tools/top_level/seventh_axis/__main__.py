@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from itertools import takewhile
 from typing import TYPE_CHECKING, NamedTuple
 
 from seventh_axis.home import HOME, hidden
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from protocol.command_line import Parser
 
 _BAD_INPUT = 2
+_NAME = "seventh-axis"
+_VERBOSE = {"-v", "--verbose"}
 
 
 class Command(NamedTuple):
@@ -54,7 +57,7 @@ Exit status: 0 done; 1 a negative verdict; 2 input that cannot be used; 128 and 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    words = _name_first(sys.argv[1:] if arguments is None else arguments)
     command = COMMANDS.get(words[0] if words else "")
     for package in ("protocol", *([command.module.partition(".")[0]] if command else [])):
         if clash := hidden(package):
@@ -65,10 +68,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if command is None:
         return _answer(words)
     import protocol.quiet_start  # noqa: F401, PLC0415  # before the slow imports
-    from protocol.command_line import COMMAND, run_as  # noqa: PLC0415  # see `seventh_axis`
+    from protocol.command_line import call_programs  # noqa: PLC0415  # see `seventh_axis`
 
-    run_as(COMMAND if command.by_name else f"{COMMAND} {words[0]}")
+    call_programs(program_names())
     return int(import_module(command.module).main(words if command.by_name else words[1:]))
+
+
+def program_names() -> dict[str, str]:
+    """Return what a user types for each module that is a program."""
+    return {
+        command.module.removesuffix(".__main__"): _NAME if command.by_name else f"{_NAME} {name}"
+        for name, command in COMMANDS.items()
+    }
+
+
+def _name_first(words: Sequence[str]) -> list[str]:
+    """Return a command line with the command's name first, also where -v stands before it."""
+    leading = sum(1 for _ in takewhile(_VERBOSE.__contains__, words))
+    return [*words[leading : leading + 1], *words[:leading], *words[leading + 1 :]]
 
 
 def _answer(words: Sequence[str]) -> int:
@@ -82,15 +99,15 @@ def _answer(words: Sequence[str]) -> int:
 def _parser() -> "Parser":
     from argparse import RawDescriptionHelpFormatter  # noqa: PLC0415  # a command needs another parser than this
 
-    from protocol.command_line import COMMAND, Parser  # noqa: PLC0415  # see `seventh_axis`
+    from protocol.command_line import Parser  # noqa: PLC0415  # see `seventh_axis`
 
     parser = Parser(
-        prog=COMMAND,
+        prog=_NAME,
         description="A rotary table's emulator and its protocol, and a motion planner for a 7-axis laser scanner.",
         epilog=_EXAMPLES,
         formatter_class=RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"{COMMAND} {_version()}")
+    parser.add_argument("--version", action="version", version=f"{_NAME} {_version()}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", dest="command", required=True)
     for name, command in COMMANDS.items():
         commands.add_parser(name, help=command.help, add_help=False)

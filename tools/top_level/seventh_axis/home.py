@@ -2,6 +2,7 @@
 
 import sys
 from importlib.machinery import ModuleSpec, PathFinder
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 _ABOVE = Path(__file__).resolve().parents
@@ -11,16 +12,27 @@ HOME = next((folder for folder in _ABOVE[1:4] if (folder / "protocol" / "py.type
 
 def hidden(package: str) -> str:
     """Return in one sentence what hides a package of this project from an import; an empty text if nothing does."""
+    return _hidden(package, HOME, "seventh-axis")
+
+
+def hidden_library(package: str, distribution_name: str) -> str:
+    """Return the same for a package of an installed distribution; also empty if that is not installed."""
+    try:
+        home = Path(str(distribution(distribution_name).locate_file("")))
+    except PackageNotFoundError:
+        return ""
+    return _hidden(package, home.resolve(), distribution_name)
+
+
+def _hidden(package: str, home: Path, owner: str) -> str:
     loaded = sys.modules.get(package)
     found = PathFinder.find_spec(package) if loaded is None else getattr(loaded, "__spec__", None)
     places = _places(found)
-    if HOME / package in places:
+    if home / package in places:
         return ""
     if not places:
-        return f"{package}: the package of seventh-axis is not on the path; add {HOME} to it"
-    return (
-        f"{places[0]} hides the package {package} of seventh-axis; rename it, or see 'Name clashes' in docs/install.md"
-    )
+        return f"{package}: the package of {owner} is not on the path; add {home} to it"
+    return f"{places[0]} hides the package {package} of {owner}; rename it, or see 'Name clashes' in docs/install.md"
 
 
 def _places(found: ModuleSpec | None) -> list[Path]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from seventh_axis.home import hidden
+from seventh_axis.home import hidden, hidden_library
 
 if TYPE_CHECKING:
     from protocol.conformance.pytest.fixture import RotaryTable
@@ -46,9 +46,9 @@ def rotary_table(
     rotary_table_port: str, pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator["RotaryTable"]:
     """A new table for each test: `.client` is a client, `.url` opens it, `.trigger()` is the probe."""
-    for package in ("protocol", "emulator") if rotary_table_port.startswith(IN_PROCESS) else ("protocol",):
-        if clash := hidden(package):
-            pytest.fail(f"rotary_table: {clash}", pytrace=False)
+    ours = ("protocol", "emulator") if rotary_table_port.startswith(IN_PROCESS) else ("protocol",)
+    if clash := next(filter(None, map(hidden, ours)), "") or hidden_library("serial", "pyserial"):
+        pytest.fail(f"rotary_table: {clash}", pytrace=False)
     from protocol.conformance.pytest.fixture import RotaryTable, pty_emulator  # noqa: PLC0415 - see the module's docstring
 
     control = pytestconfig.getoption("--table-control")
