@@ -38,13 +38,13 @@ _TARGETS, _WAYS_EACH = 60, 8
 _ROLLS_DEG = (0.0, 90.0)
 _LENGTH_MM = 60.0
 _FEWEST_POSES = 3
-_BATCH = 4
+_BATCH = 2
 """Strips that are chosen at once."""
 _TRIED_FIRST = 200
 """Candidates whose reach is looked for at once, those that are worth most first."""
 _LEAST_WORTH = 3.0
 """What a strip has to be worth, in guesses."""
-_KEPT, _MOST_TRIES = 0.5, 30
+_KEPT, _MOST_TRIES = 0.25, 15
 """What a guess keeps of its worth with each strip that should have seen it and did not."""
 
 
