@@ -44,7 +44,7 @@ def strips_figure(scanned: AdaptiveScanned) -> Figure:
         mpl.patches.Patch(color=PALE, label="cannot be seen"),
     ]
     if scanned.path is not None:
-        handles.insert(0, mpl.patches.Patch(color=GRAY, label="seen along the path"))
+        handles.insert(0, mpl.patches.Patch(color=SKY, label="seen along the path"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     if scanned.strips:
         norm = mpl.colors.Normalize(1, max(2, len(scanned.strips)))

@@ -56,7 +56,8 @@ def adaptive_report(scanned: AdaptiveScanned, origin: Origin | None = None) -> s
             f"Coverage strip by strip: {scanned.share_of_visible:.1%} of what can be seen in the end.",
         ),
         table(
-            ("strip", "of what can be seen", "of the whole", "table (deg)", "way to it (s)", "motion (s)", "off plan at most"),
+            ("strip", "of what can be seen", "of the whole", "table (deg)", "way to it (s)", "motion (s)",
+             "off plan at most"),
             list(_strips(scanned)),
             words=True,
         ),
