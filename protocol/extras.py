@@ -9,7 +9,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     ),
     "tools": ("control", "threadpoolctl"),
     "adaptive": ("small_gicp", "gpytoolbox"),
-    "test": ("pytest", "xdist", "hypothesis", "ruckig", "py_opw_kinematics", "coal"),
+    "test": ("pytest", "xdist", "hypothesis", "ruckig", "py_opw_kinematics", "coal", "ortools"),
     "completion": ("argcomplete",),
 }  # fmt: skip
 """The modules of each extra. `tools` includes those of `planner`, and `test` includes both."""

@@ -106,8 +106,9 @@ def coverage_steps_figure(scanned: AdaptiveScanned) -> Figure:
     first = int(scanned.path is None)
     numbers = np.arange(first, first + len(shares))
     axes.bar(numbers, shares, color=[SKY if scanned.path is not None and n == 0 else BLUE for n in numbers], width=0.7)
-    axes.axhline(scanned.wanted, **LIMIT)
-    axes.annotate(f"wanted {scanned.wanted:.1%}", (numbers[0] - 0.4, scanned.wanted), va="bottom", color=GREEN)
+    if scanned.wanted > 0.0:
+        axes.axhline(scanned.wanted, **LIMIT)
+        axes.annotate(f"wanted {scanned.wanted:.1%}", (numbers[0] - 0.4, scanned.wanted), va="bottom", color=GREEN)
     axes.set_ylim(0.0, 1.08)
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -1,8 +1,7 @@
 """Where surface may be that nobody has seen: beyond the rim of the seen surface, and at the edge of unknown space.
 
 Beyond its rim the surface goes on straight, or folds away from the probe or towards it: all three are guessed, and what
-is known to be free is taken out. A guess is worth what it has been worth so far: each strip that should have seen it
-and did not halves its weight.
+is known to be free is taken out.
 """
 
 from typing import NamedTuple

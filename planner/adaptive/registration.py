@@ -1,10 +1,10 @@
 """Join two clouds of one part that overlap: find the pose of the second in the frame of the first, or say why not.
 
 Generalized ICP (Segal, Haehnel and Thrun, 2009) by small_gicp, from many first guesses, so that a second pose that
-fits as well is found. Two things decide: the overlap, points of the second cloud that
-have a point of the first one near, with the same normal; and contradictions, points of one cloud in space that the
-laser passed for the other one. The pose is refused where the overlap leaves a motion free (a cylinder about its own
-axis), where another pose fits as well (a symmetric part), and where the overlap is too small.
+fits as well is found. Two things decide: the overlap, points of the second cloud that have a point of the first one
+near, with the same normal; and contradictions, points of one cloud in space that the laser passed for the other one.
+The pose is refused where the overlap leaves a motion free (a cylinder about its own axis), where another pose fits as
+well (a symmetric part), and where the overlap is too small.
 """
 
 from typing import NamedTuple
@@ -38,12 +38,12 @@ _FEWEST_SHARE = 0.15
 _RIVAL_SHARE, _RIVAL_RESIDUAL, _RIVAL_MORE = 0.85, 1.5, 0.03
 """Another pose fits as well when it has this share of the overlap, this ratio of the residual, and so many more
 contradictions."""
-_OTHER_DEG, _OTHER_SHARE = 8.0, 0.03
+_OTHER_DEG, _OTHER_SHARE = 4.0, 0.02
 """How far two poses of the part are apart to be two: by rotation, or by a share of its size."""
 _WEAKEST = 0.03
 """How much the surface must resist each motion: root mean square motion across the surface for 1 mm."""
 _PATCH_MM = 5.0
-"""Errors of the points are the same within such a distance, at a guess: of the alignment, not noise."""
+"""Errors of the alignment are the same within such a distance (an estimate): they do not average out as noise does."""
 _MOST_UNCERTAIN_MM = 0.05
 
 
@@ -77,7 +77,7 @@ class Joined(NamedTuple):
         T_12: `(4, 4)` takes the second cloud to the frame of the first.
         overlap: Where they have each other near.
         weakest: How much the surface resists the motion that it resists least; 1 where all of it is in the way.
-        uncertainty_mm: 1 sigma of a point's place, at the part's ends, at a guess.
+        uncertainty_mm: 1 sigma of a point's place at the part's ends (an estimate).
     """
 
     T_12: FloatArray
@@ -204,7 +204,8 @@ def _passed(free: VoxelMap, points: FloatArray) -> BoolArray:
 def _best_first(pair: _Pair, poses: list[FloatArray]) -> list[tuple[Overlap, FloatArray]]:
     """Return the poses that may be the right one, those that fit best first."""
     judged = sorted(((pair.overlap(T), T) for T in poses), key=lambda each: -each[0].worth)
-    return [each for each in judged if each[0].worth >= _HOPEFUL_SHARE * judged[0][0].worth][:_REFINED]
+    most = judged[0][0].worth
+    return [each for each in judged if each[0].worth >= most - (1.0 - _HOPEFUL_SHARE) * abs(most)][:_REFINED]
 
 
 def _guesses(first: Cloud, second: Cloud, about_12: FloatArray) -> list[FloatArray]:

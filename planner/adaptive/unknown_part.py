@@ -24,6 +24,7 @@ from planner.cell.patterns import StripLayout, cylinder_rings
 from planner.cell.scan import Scan, check_it_fits_the_table
 from planner.cell.scan_path import ScanPath, at_scan_speed
 from planner.cell.workpiece import Cylinder
+from planner.errors import WorkpieceError
 from planner.geometry.box_distance import FIELD
 from planner.geometry.thinned_cloud import ThinnedCloud
 from planner.scanning.probe import LaserProbe
@@ -38,13 +39,13 @@ _TARGETS, _WAYS_EACH = 60, 8
 _ROLLS_DEG = (0.0, 90.0)
 _LENGTH_MM = 60.0
 _FEWEST_POSES = 3
-_BATCH = 4
+_BATCH = 2
 """Strips that are chosen at once."""
 _TRIED_FIRST = 200
 """Candidates whose reach is looked for at once, those that are worth most first."""
 _LEAST_WORTH = 3.0
 """What a strip has to be worth, in guesses."""
-_KEPT, _MOST_TRIES = 0.5, 30
+_KEPT, _MOST_TRIES = 0.25, 15
 """What a guess keeps of its worth with each strip that should have seen it and did not."""
 
 
@@ -60,7 +61,10 @@ def survey(scan: Scan, bounds: Cylinder, speed_mm_s: float) -> Scan:
         WorkpieceError: The cylinder reaches beyond the table.
     """
     mesh = bounds.mesh()
-    check_it_fits_the_table(mesh, scan.cell)
+    try:
+        check_it_fits_the_table(mesh, scan.cell)
+    except WorkpieceError as error:
+        raise WorkpieceError(f"the bounding cylinder does not fit the table: {error}") from error
     probe = replace(scan.cell.probe, stand_off_mm=scan.cell.probe.nearest_mm + _SURVEY_GAP_MM)
     waypoints = cylinder_rings(bounds, probe, StripLayout())
     path = at_scan_speed(waypoints, speed_mm_s, _SURVEY_STEP_S, probe.stand_off_mm, probe.line_width_mm)
@@ -88,6 +92,7 @@ class UnknownPart:
         self._estimate = Estimate(self._cloud)
         self._guesses = guesses(self._estimate, self._voxels, bounds.middle_mm[2])
         self._count = 0
+        self._solid: Obstacle | None = None
 
     def take(self, strip: Strip | None, returned: Returned) -> None:
         """Take in what the probe returned; see `Policy`.
@@ -97,6 +102,7 @@ class UnknownPart:
         """
         origins = returned.T_WS[returned.profiles, :3, 3]
         ways = returned.points_W - origins
+        self._solid = None
         self._voxels.take(origins, returned.points_W)
         self._cloud.take(returned.points_W, ways / np.linalg.norm(ways, axis=1, keepdims=True))
         if strip is not None:
@@ -109,8 +115,10 @@ class UnknownPart:
 
     def solid(self) -> Obstacle:
         """Return the space that was not seen to be free; light passes it."""
-        T_TW = self._surroundings.cell.T_TW
-        return Obstacle("unseen space", FIELD, np.zeros(3), T_TW, True, self._voxels.field(), stops_light=False)
+        if self._solid is None:
+            T_TW, field = self._surroundings.cell.T_TW, self._voxels.field()
+            self._solid = Obstacle("unseen space", FIELD, np.zeros(3), T_TW, True, field, stops_light=False)
+        return self._solid
 
     def state(self) -> str:
         """Return the area that was seen."""

@@ -91,7 +91,7 @@ def _adaptive(scan: Scan, known: Scan, asked: ScanOptions, arguments: argparse.N
     """Scan adaptively; `known` has the mesh that the strips are chosen by. Return the exit status."""
     out: Path = arguments.out
     wanted = AdaptOptions(
-        share=SHARE_SEEN if arguments.adapt is None else arguments.adapt,
+        share=_share_wanted(arguments),
         most_strips=arguments.most_strips,
         bounds=None if arguments.blind is None else Cylinder(*arguments.blind),
     )
@@ -101,17 +101,17 @@ def _adaptive(scan: Scan, known: Scan, asked: ScanOptions, arguments: argparse.N
     save_scan(out / "scan.json", document)
     write_whole(out / REPORT_FILE, adaptive_report(found, origin))
     sys.stdout.write(summary(found.scanned) + adaptive_summary(found))
-    is_joined = True
+    is_turned = True
     if arguments.turn_over and found.session.failure is None:
         turned = scan_turned_over(found, scan, asked, wanted, out, _progress_of, _show_strips)
-        is_joined = _write_turned_over(turned, document, out, origin)
+        is_turned = _write_turned_over(turned, document, out, origin)
     if found.session.contradicts:
         raise PlannerError(f"{found.session.failure}; what was scanned is in {out}")
-    return 0 if found.has_succeeded and is_joined else _INCOMPLETE
+    return 0 if found.has_succeeded and is_turned else _INCOMPLETE
 
 
 def _write_turned_over(turned: TurnedOver, document: dict[str, Any], out: Path, origin: Origin) -> bool:
-    """Write and print what the second placement came to, and return whether the clouds were joined."""
+    """Write and print what the second placement came to, and return whether it succeeded."""
     show_line("", sys.stderr)
     second = out / TURNED_FOLDER
     adaptive = adaptive_document(turned.second)
@@ -119,7 +119,7 @@ def _write_turned_over(turned: TurnedOver, document: dict[str, Any], out: Path, 
     write_whole(second / REPORT_FILE, adaptive_report(turned.second, origin))
     save_scan(out / "scan.json", document | {"turned_over": turned_over_document(turned)})
     sys.stdout.write(turned_over_summary(turned))
-    return not isinstance(turned.joined, str)
+    return turned.second.has_succeeded and not isinstance(turned.joined, str)
 
 
 def _progress_of(label: str) -> Progress | None:
@@ -128,6 +128,13 @@ def _progress_of(label: str) -> Progress | None:
 
 def _show_strips(number: int, state: str) -> None:
     show_line(f"strip {number}: {state}", sys.stderr)
+
+
+def _share_wanted(arguments: argparse.Namespace) -> float:
+    """Return the share of what can be seen that is wanted; without the mesh nobody knows it while scanning."""
+    if arguments.adapt is not None:
+        return float(arguments.adapt)
+    return 0.0 if arguments.blind is not None else SHARE_SEEN
 
 
 def _is_adaptive(arguments: argparse.Namespace) -> bool:

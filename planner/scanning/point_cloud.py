@@ -71,7 +71,8 @@ class PlyWriter:
 
 def read_cloud(file: Path) -> tuple[FloatArray, FloatArray]:
     """Return the points `(n, 3)` in mm and the directions of the laser `(n, 3)` of a file that `PlyWriter` wrote."""
-    vertices = PlyData.read(str(file))["vertex"].data
+    with file.open("rb") as content:
+        vertices = PlyData.read(content, mmap=False)["vertex"].data
     columns = np.column_stack([np.asarray(vertices[name], dtype=np.float64) for name in _COORDINATES])
     return columns[:, :3], columns[:, 3:]
 

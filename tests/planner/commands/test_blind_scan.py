@@ -29,7 +29,7 @@ def scan_file(tmp_path: Path) -> str:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--blind", "700", "60"], "350.0 mm from the table's axis"),
+        (["--blind", "700", "60"], "the bounding cylinder does not fit the table"),
         (["--blind", "120", "80", "--turn-over"], "--turn-over: the other face is chosen by the mesh"),
         (["--blind", "120"], "--blind: expected 2 arguments"),
         (["--blind", "120", "-5"], "--blind"),
