@@ -44,6 +44,10 @@ TOLERANCE_DEG = 0.25
 RUN_ON_DEG = 90.0
 """Maximum angle that the table runs on if the line fails."""
 PROFILES_HZ = 25.0
+SHARE_SEEN = 0.99
+"""Share of what can be seen that an adaptive scan sees."""
+MOST_STRIPS = 200
+"""How many strips an adaptive scan has at most."""
 
 REPORT_FILE = "report.html"
 """The name of the page in a folder of results."""

@@ -8,7 +8,8 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
         "numpy", "numba", "scipy", "matplotlib", "trimesh", "rtree", "embreex", "mapbox_earcut", "plyfile",
     ),
     "tools": ("control", "threadpoolctl"),
-    "test": ("pytest", "xdist", "hypothesis", "ruckig", "py_opw_kinematics", "coal"),
+    "adaptive": ("small_gicp", "gpytoolbox"),
+    "test": ("pytest", "xdist", "hypothesis", "ruckig", "py_opw_kinematics", "coal", "ortools"),
     "completion": ("argcomplete",),
 }  # fmt: skip
 """The modules of each extra. `tools` includes those of `planner`, and `test` includes both."""
@@ -33,6 +34,16 @@ def missing_extra(error: BaseException, *command: str) -> str:
     if extra == "planner" and _WITH_TOOLS.intersection(command):
         extra = "tools"
     return f"{module} is not installed: needs 'seventh-axis[{extra}]'; run: pip install 'seventh-axis[{extra}]'"
+
+
+def need(module: str) -> None:
+    """Raise the error of a missing import now, for a module that only the end of long work imports.
+
+    Raises:
+        ModuleNotFoundError: It is not installed.
+    """
+    if find_spec(module) is None:
+        raise ModuleNotFoundError(f"No module named {module!r}", name=module)
 
 
 def is_installed(extra: str) -> bool:

@@ -43,3 +43,14 @@ def positive_number(text: str) -> float:
     if not 0.0 < number <= 1000.0:
         raise argparse.ArgumentTypeError(f"is {text}; allowed: a number above 0 and at most 1000")
     return number
+
+
+def share(text: str) -> float:
+    """Return a number above 0 and up to 1."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0.0 < value <= 1.0:
+        raise argparse.ArgumentTypeError(f"is {text}; allowed is a share above 0 and up to 1, such as 0.99")
+    return value

@@ -32,6 +32,7 @@ ROOMS = {
         "execution",
         "tracking",
         "scanning",
+        "adaptive",
         "commands",
     ],
     "emulator": ["plant", "firmware", "line", "faults", "config", "table", "avr", "ports", "server"],

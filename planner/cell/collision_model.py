@@ -72,8 +72,8 @@ def collision_model(
         raise ValueError("a part moves with frame 4 or 5; both flips of the wrist must put every part in one place")
     fields = [obstacle.field for obstacle in obstacles if obstacle.field is not None]
     if len(fields) > 1:
-        raise ValueError(f"{len(fields)} obstacles are meshes; the collision model allows one")
-    pairs, n_common = _pairs(bodies, len(obstacles))
+        raise ValueError(f"{len(fields)} obstacles are meshes, the collision model takes one")
+    pairs, n_common = _pairs(bodies, obstacles)
     model = CollisionModel(
         bodies=_body_table(bodies, T_FS),
         obstacles=_obstacle_table(obstacles),
@@ -114,15 +114,16 @@ def _obstacle_table(obstacles: Sequence[Obstacle]) -> FloatArray:
     return np.array(rows).reshape(-1, 10)
 
 
-def _pairs(bodies: Bodies, n_obstacles: int) -> tuple[IndexArray, int]:
-    """Return the pairs that can collide, first those common to all arm configurations, and the number of these."""
+def _pairs(bodies: Bodies, obstacles: Sequence[Obstacle]) -> tuple[IndexArray, int]:
+    """Return the pairs that can meet, those common to all arm configurations first, and how many those are."""
     links = [*(part.link for part in bodies.parts), bodies.housing.link]
     beam = len(links)
-    obstacles = range(beam + 1, beam + 1 + n_obstacles)
+    numbered = list(enumerate(obstacles, beam + 1))
     tool = [body for body, link in enumerate(links) if link >= WRIST_LINK]
     arm = [body for body, link in enumerate(links) if _FIXED_LINK < link < WRIST_LINK]
-    common = [(body, obstacle) for body in (*tool, beam) for obstacle in obstacles]
-    others = [(body, obstacle) for body in arm for obstacle in obstacles]
+    common = [(body, number) for body in tool for number, _ in numbered]
+    common += [(beam, number) for number, obstacle in numbered if obstacle.stops_light]
+    others = [(body, number) for body in arm for number, _ in numbered]
     others += [(a, b) for a in range(beam) for b in range(a) if abs(links[a] - links[b]) > 1]
     others += [(beam, body) for body, link in enumerate(links) if link < WRIST_LINK]
     return np.array([*common, *others], dtype=np.int64).reshape(-1, 2), len(common)

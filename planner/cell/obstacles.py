@@ -34,6 +34,7 @@ class Obstacle(NamedTuple):
         pose: `(4, 4)`, the shape's frame in the table's frame if it turns with the table, else in the base's frame.
         turning: whether it turns with the table.
         field: the field, for that kind.
+        stops_light: whether the beam must not pass it. Space that nobody has seen is solid for the arm alone.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Obstacle(NamedTuple):
     pose: FloatArray
     turning: bool
     field: SignedDistanceField | None = None
+    stops_light: bool = True
 
 
 def box(name: str, lengths_mm: tuple[float, float, float], pose: FloatArray, *, turning: bool) -> Obstacle:

@@ -32,8 +32,12 @@ from protocol.progress import Progress
 from protocol.toml_table import TomlTable
 
 DEFAULT_ARM = "viper_s650"
+ADAPTIVE = "adaptive"
+"""The pattern of a scan without a predefined path: all of its strips are chosen by what was not seen yet."""
 # A workpiece may touch the table, and the base of a mesh need not be exactly flat.
 _BASE_TOLERANCE_MM = 0.5
+# Of any path, those of adaptive scanning included.
+_FEWEST_LOCATIONS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +51,7 @@ class Scan:
         workpiece: class and dimensions of the workpiece; None for a mesh without a class.
         mesh: closed surface of the workpiece in frame W, in mm.
         mesh_file: file of that surface; None if it follows from the dimensions.
-        path: the required poses of the probe.
+        predefined_path: the required poses of the probe; None where `path.pattern` is adaptive.
         value: the value function for poses.
         limits: limits of the table.
         weights: weights for the motion of the table.
@@ -59,10 +63,29 @@ class Scan:
     workpiece: Workpiece | None
     mesh: trimesh.Trimesh = field(repr=False)
     mesh_file: Path | None
-    path: ScanPath = field(repr=False)
+    predefined_path: ScanPath | None = field(repr=False)
     value: ValueFunction
     limits: Limits
     weights: Weights
+
+    @property
+    def has_path(self) -> bool:
+        """Whether there is a predefined path."""
+        return self.predefined_path is not None
+
+    @property
+    def path(self) -> ScanPath:
+        """The predefined path.
+
+        Raises:
+            ScanFileError: There is none.
+        """
+        if self.predefined_path is None:
+            raise ScanFileError(
+                f"{self.name}: path.pattern is {ADAPTIVE}: there is no predefined path to map or to plan;"
+                " scan it with python -m planner scan, or choose another pattern"
+            )
+        return self.predefined_path
 
 
 def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progress: Progress | None = None) -> Scan:
@@ -92,10 +115,10 @@ def load_scan(scan: str | Path, say: Callable[[str], None] | None = None, progre
         value = ValueFunction.read(top.table("value"))
         limits = _read_limits(top.table("limits"))
         weights = _read_weights(top.table("weights"), limits)
-        if costs_overflow(weights, limits, len(path.T_WS)):
+        if costs_overflow(weights, limits, _FEWEST_LOCATIONS if path is None else len(path.T_WS)):
             raise ScanFileError(f"{file}: weights: k_a or k_w is so large that the cost of a path overflows; reduce it")
     # A pattern on a shape of given dimensions always meets it.
-    if say is not None and (mesh_file is not None or "file" in top.table("path")):
+    if say is not None and path is not None and (mesh_file is not None or "file" in top.table("path")):
         warning = beam_warning(path.T_WS, mesh, cell.probe)
         if warning is not None:
             say(f"{file}: path: {warning}")
@@ -240,16 +263,19 @@ def check_it_fits_the_table(mesh: trimesh.Trimesh, cell: Cell) -> None:
 
 def _read_path(
     section: TomlTable, folder: Path, cell: Cell, workpiece: Workpiece | None, mesh: trimesh.Trimesh | None
-) -> ScanPath:
-    """Return the path; `mesh` is None for a workpiece of given dimensions."""
+) -> ScanPath | None:
+    """Return the path, None for an adaptive scan; `mesh` is None for a workpiece of given dimensions."""
+    kind = "other" if workpiece is None else type(workpiece).__name__.lower()
+    # A pattern of another class can be laid on a mesh as well.
+    patterns = [ADAPTIVE, *sorted(PATTERNS[kind] if mesh is None else CLASS_OF_PATTERN)]
+    if "pattern" in section and section.choice("pattern", patterns) == ADAPTIVE:
+        section.finish()
+        return None
     step_s = section.number("time_step_s", above=0.0)
     if "file" in section:
         file = folder / section.text("file")
-        section.finish()
+        section.only("time_step_s", "file")
         return load_scan_path(file, step_s)
-    kind = "other" if workpiece is None else type(workpiece).__name__.lower()
-    # A pattern of another class can be applied to a mesh as well.
-    patterns = sorted(PATTERNS[kind] if mesh is None else CLASS_OF_PATTERN)
     if workpiece is None and "pattern" not in section:
         raise section.refuse("file", f"a path file, unless path.pattern is one of {', '.join(patterns)}")
     pattern = section.choice("pattern", patterns)

@@ -11,6 +11,7 @@ from planner.defaults import (
     LAG_S,
     LEAD_S,
     MILLIMETERS,
+    MOST_STRIPS,
     PART_CLASSES,
     PATTERN_NAMES,
     PLANNER_NAMES,
@@ -19,13 +20,14 @@ from planner.defaults import (
     RECEDING,
     REPORT_FILE,
     RUN_ON_DEG,
+    SHARE_SEEN,
     TOLERANCE_DEG,
     shipped_scans,
 )
 from planner.plug_ins import PLANNER_GROUP, plug_in_names
 from protocol.command_line import Parser, program_name
 from protocol.data_file import did_you_mean
-from protocol.number_options import number, positive_number, whole_number
+from protocol.number_options import number, positive_number, share, whole_number
 
 _Commands = "argparse._SubParsersAction[Parser]"
 
@@ -149,7 +151,8 @@ def _add_scan(commands: "argparse._SubParsersAction[Parser]") -> None:
         help="scan a workpiece with a simulated probe, and compute the error budget of its cloud",
         description="Plan a scan, move the table, take laser profiles and align them to one cloud; exit status 1 when"
         " it ended early.",
-        epilog=f"example: {_program()} scan cylinder --decimals 3 --out build/cylinder",
+        epilog=f"examples: {_program()} scan cylinder --decimals 3 --out build/cylinder;"
+        f" {_program()} scan part.toml --adapt 0.99 --out build/part",
     )
     _add_scan_option(parser)
     parser.add_argument("--mesh", type=Path, metavar="FILE", help="replace the workpiece by this mesh")
@@ -170,13 +173,47 @@ def _add_scan(commands: "argparse._SubParsersAction[Parser]") -> None:
     parser.add_argument(
         "--exact-calibration", action="store_true", help="align with the true placements instead of calibrated ones"
     )
+    _add_adaptive(parser)
     parser.add_argument("--xyz", action="store_true", help="write cloud.xyz as well")
+    parser.add_argument(
+        "--normals", action="store_true", help="write normals.ply as well: the cloud thinned to 0.5 mm, with normals"
+    )
+    parser.add_argument(
+        "--surface", type=Path, metavar="FILE.ply",
+        help="write a triangle mesh of the cloud, by Poisson reconstruction (extra: adaptive)",
+    )  # fmt: skip
     parser.add_argument(
         "--seed", type=whole_number(0, 2**31), default=0, metavar="N", help="random seed of the noise (default: 0)"
     )
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for cloud.ply, scan.json and report.html"
+        "--out",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="folder for cloud.ply, poses.csv, scan.json and report.html",
     )
+
+
+def _add_adaptive(parser: argparse.ArgumentParser) -> None:
+    """Add what an adaptive scan is for."""
+    parser.add_argument(
+        "--adapt", type=share, metavar="SHARE",
+        help="after the path, scan strips until this share of what can be seen is seen, such as 0.99"
+        f" (default of a scan with pattern adaptive: {SHARE_SEEN:g})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--most-strips", type=whole_number(1, 10_000), default=MOST_STRIPS, metavar="N",
+        help="maximum number of adaptive strips (default: %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--blind", type=positive_number, nargs=2, metavar=("DIAMETER", "HEIGHT"),
+        help="choose the strips without the mesh, inside an approximate cylinder about the z axis of the workpiece's"
+        " frame that holds the part, in mm",
+    )  # fmt: skip
+    parser.add_argument(
+        "--turn-over", action="store_true",
+        help="lay the part on another face afterwards, scan it again, and join both clouds (extra: adaptive)",
+    )  # fmt: skip
 
 
 def _add_show(commands: "argparse._SubParsersAction[Parser]") -> None:

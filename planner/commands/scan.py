@@ -4,10 +4,22 @@ import argparse
 import sys
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
-from planner.cell.scan import load_scan, with_mesh
+from planner.adaptive.adaptive_report import adaptive_document, adaptive_report, adaptive_summary
+from planner.adaptive.adaptive_scan import AdaptOptions, scan_adaptively
+from planner.adaptive.turn_over import (
+    JOINED_FILE,
+    TURNED_FOLDER,
+    TurnedOver,
+    scan_turned_over,
+    turned_over_document,
+    turned_over_summary,
+)
+from planner.cell.scan import Scan, load_scan, with_mesh
+from planner.cell.workpiece import Cylinder
 from planner.commands import options
-from planner.defaults import REPORT_FILE
+from planner.defaults import REPORT_FILE, SHARE_SEEN
 from planner.errors import PlannerError
 from planner.scanning.latched_run import TriggerConditions
 from planner.scanning.scan_file import save_scan, scan_document
@@ -16,19 +28,28 @@ from planner.scanning.scan_run import Scanned, ScanOptions, scan_workpiece
 from planner.set_aside import set_aside
 from protocol import TableError
 from protocol.color import colored
+from protocol.extras import need
 from protocol.page import Origin
-from protocol.progress import progress_line
+from protocol.progress import Progress, progress_line, show_line
 from protocol.whole_file import write_whole
 
 _INCOMPLETE = 1
-SCAN_RESULTS = ("cloud.ply", "cloud.xyz", "scan.json", REPORT_FILE)
+SCAN_RESULTS = ("cloud.ply", "cloud.xyz", "normals.ply", "poses.csv", JOINED_FILE, "scan.json", REPORT_FILE)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Scan, write cloud, figures and report, print a summary, and return the exit status."""
+    if arguments.surface is not None:
+        need("gpytoolbox")
+        _check_surface_file(arguments.surface)
+    if arguments.turn_over:
+        need("small_gicp")
+        if arguments.blind is not None:
+            raise PlannerError("--turn-over: the other face is chosen by the mesh; leave out --blind")
+        set_aside(arguments.out / TURNED_FOLDER, SCAN_RESULTS)
     set_aside(arguments.out, SCAN_RESULTS, keep=() if arguments.mesh is None else (arguments.mesh,))
     progress = progress_line("mesh", sys.stderr)
-    scan = load_scan(arguments.scan, options.say, progress)
+    scan = known = load_scan(arguments.scan, options.say, progress)
     if arguments.mesh is not None:
         scan = with_mesh(scan, arguments.mesh, arguments.unit, options.say, progress)
     asked = ScanOptions(
@@ -43,6 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
         angle_count=arguments.angles,
         exact_calibration=arguments.exact_calibration,
         xyz=arguments.xyz,
+        normals=arguments.normals,
+        surface=arguments.surface,
         triggers=TriggerConditions(rate_hz=arguments.rate, seed=arguments.seed),
         seed=arguments.seed,
     )
@@ -50,7 +73,9 @@ def run(arguments: argparse.Namespace) -> int:
     in_simulated_time = arguments.port.startswith("emulator://")
     begun = None if in_simulated_time else datetime.now().astimezone().isoformat(timespec="seconds")
     try:
-        scanned = scan_workpiece(scan, asked, out, lambda label: progress_line(label, sys.stderr))
+        if _is_adaptive(arguments) or not scan.has_path:
+            return _adaptive(scan, known, asked, arguments, Origin(arguments.command_line, begun))
+        scanned = scan_workpiece(scan, asked, out, _progress_of)
         save_scan(out / "scan.json", scan_document(scanned))
         write_whole(out / REPORT_FILE, scan_report(scanned, Origin(arguments.command_line, begun)))
     except TableError as error:
@@ -60,6 +85,68 @@ def run(arguments: argparse.Namespace) -> int:
     verdict = colored(verdict_of(scanned), "good" if scanned.is_whole else "bad", sys.stdout)
     sys.stdout.write(f"{scanned.scan.name}: {verdict}\n{summary(scanned)}")
     return 0 if scanned.is_whole else _INCOMPLETE
+
+
+def _adaptive(scan: Scan, known: Scan, asked: ScanOptions, arguments: argparse.Namespace, origin: Origin) -> int:
+    """Scan adaptively; `known` has the mesh that the strips are chosen by. Return the exit status."""
+    out: Path = arguments.out
+    wanted = AdaptOptions(
+        share=_share_wanted(arguments),
+        most_strips=arguments.most_strips,
+        bounds=None if arguments.blind is None else Cylinder(*arguments.blind),
+    )
+    found = scan_adaptively(scan, asked, wanted, out, _progress_of, _show_strips, known)
+    show_line("", sys.stderr)
+    document = scan_document(found.scanned) | {"adaptive": adaptive_document(found)}
+    save_scan(out / "scan.json", document)
+    write_whole(out / REPORT_FILE, adaptive_report(found, origin))
+    sys.stdout.write(summary(found.scanned) + adaptive_summary(found))
+    is_turned = True
+    if arguments.turn_over and found.session.failure is None:
+        turned = scan_turned_over(found, scan, asked, wanted, out, _progress_of, _show_strips)
+        is_turned = _write_turned_over(turned, document, out, origin)
+    if found.session.contradicts:
+        raise PlannerError(f"{found.session.failure}; what was scanned is in {out}")
+    return 0 if found.has_succeeded and is_turned else _INCOMPLETE
+
+
+def _write_turned_over(turned: TurnedOver, document: dict[str, Any], out: Path, origin: Origin) -> bool:
+    """Write and print what the second placement came to, and return whether it succeeded."""
+    show_line("", sys.stderr)
+    second = out / TURNED_FOLDER
+    adaptive = adaptive_document(turned.second)
+    save_scan(second / "scan.json", scan_document(turned.second.scanned) | {"adaptive": adaptive})
+    write_whole(second / REPORT_FILE, adaptive_report(turned.second, origin))
+    save_scan(out / "scan.json", document | {"turned_over": turned_over_document(turned)})
+    sys.stdout.write(turned_over_summary(turned))
+    return turned.second.has_succeeded and not isinstance(turned.joined, str)
+
+
+def _progress_of(label: str) -> Progress | None:
+    return progress_line(label, sys.stderr)
+
+
+def _show_strips(number: int, state: str) -> None:
+    show_line(f"strip {number}: {state}", sys.stderr)
+
+
+def _share_wanted(arguments: argparse.Namespace) -> float:
+    """Return the share of what can be seen that is wanted; without the mesh nobody knows it while scanning."""
+    if arguments.adapt is not None:
+        return float(arguments.adapt)
+    return 0.0 if arguments.blind is not None else SHARE_SEEN
+
+
+def _is_adaptive(arguments: argparse.Namespace) -> bool:
+    return arguments.adapt is not None or arguments.blind is not None or arguments.turn_over
+
+
+def _check_surface_file(file: Path) -> None:
+    """Refuse, before the scan, a file that could not be written after it."""
+    if file.suffix.lower() != ".ply":
+        raise PlannerError(f"{file}: a surface is written as PLY; choose a name that ends in .ply")
+    if not file.parent.is_dir():
+        raise PlannerError(f"{file}: there is no folder {file.parent}; create it, or choose another file")
 
 
 def summary(scanned: Scanned) -> str:

@@ -54,16 +54,8 @@ class RunInput:
         return replace(self, plan=replace(plan, cost=path_cost(self.problem, *motion, plan.pauses)))
 
     def turned(self, turns: int) -> "RunInput":
-        """Return the same scan, shifted by full turns of the table."""
-        plan = self.plan
-        shifted_deg = 360.0 * turns
-        pauses = tuple(
-            pause._replace(
-                from_angle_deg=pause.from_angle_deg + shifted_deg, to_angle_deg=pause.to_angle_deg + shifted_deg
-            )
-            for pause in plan.pauses
-        )
-        return replace(self, plan=replace(plan, angles_deg=plan.angles_deg + shifted_deg, pauses=pauses))
+        """Return the same scan, full turns of the table farther."""
+        return replace(self, plan=self.plan.turned(turns))
 
 
 def load_run_input(plan_file: Path, map_file: Path | None = None) -> RunInput:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from planner.arrays import CodeArray, FloatArray, IndexArray
+from planner.cell.cell import Cell
 from planner.cell.scan import Scan
 from planner.kinematics.arm import Arm
 from planner.kinematics.configuration import Configuration
@@ -26,8 +27,12 @@ class ArmOnPath:
 
 def arm_on_path(scan: Scan, configuration: Configuration) -> ArmOnPath:
     """Return the arm of a scan in one configuration."""
-    cell = scan.cell
-    T_TF = cell.location_factors(scan.path.T_WS)
+    return arm_along(scan.cell, scan.path.T_WS, configuration)
+
+
+def arm_along(cell: Cell, T_WS: FloatArray, configuration: Configuration) -> ArmOnPath:
+    """Return the arm of a cell along scan locations `(n, 4, 4)` in one configuration."""
+    T_TF = cell.location_factors(T_WS)
 
     def solve(locations: IndexArray, angles_deg: FloatArray) -> tuple[FloatArray, CodeArray]:
         joints, reasons = inverse_kinematics(cell.arm, cell.table_factors(angles_deg) @ T_TF[locations])

@@ -1,7 +1,7 @@
 """The result of a planner: a `Plan`, or `NoPlan` with the reason."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple
 
@@ -100,6 +100,17 @@ class Plan:
     pauses: tuple[Pause, ...] = ()
     waits: tuple[Wait, ...] = ()
     computing_time_s: float | None = field(default=None, compare=False)
+
+    def turned(self, turns: int) -> "Plan":
+        """Return the same motion, full turns of the table farther."""
+        shifted_deg = 360.0 * turns
+        pauses = tuple(
+            pause._replace(
+                from_angle_deg=pause.from_angle_deg + shifted_deg, to_angle_deg=pause.to_angle_deg + shifted_deg
+            )
+            for pause in self.pauses
+        )
+        return replace(self, angles_deg=self.angles_deg + shifted_deg, pauses=pauses)
 
     @property
     def configurations(self) -> list[str]:

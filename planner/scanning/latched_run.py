@@ -3,8 +3,8 @@
 This part needs the table, but measures nothing yet. Its result has one row for each profile.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -93,6 +93,40 @@ class LatchedRun:
     def failure(self) -> str | None:
         """Why the motion ended early; None if it was completed."""
         return self.record.failure
+
+
+def numbered_from(run: LatchedRun, first: int) -> LatchedRun:
+    """Return a run whose profiles are numbered from `first` on."""
+    dropped = {number + first: drop for number, drop in run.dropped.items()}
+    return replace(run, numbers=run.numbers + first, dropped=dropped)
+
+
+def number_after(run: LatchedRun) -> int:
+    """Return the first number that no profile of a run has, dropped ones included."""
+    return 1 + max([*run.numbers[-1:].tolist(), *run.dropped], default=-1)
+
+
+def joined(runs: Sequence[LatchedRun]) -> LatchedRun:
+    """Return the profiles of several runs, one after the other; the record is that of the last one."""
+
+    def column(of: Callable[[LatchedRun], FloatArray]) -> FloatArray:
+        return np.concatenate([of(run) for run in runs])
+
+    return LatchedRun(
+        numbers=np.concatenate([run.numbers for run in runs]),
+        times_s=column(lambda run: run.times_s),
+        joints_deg=column(lambda run: run.joints_deg),
+        angles_deg=column(lambda run: run.angles_deg),
+        true_joints_deg=column(lambda run: run.true_joints_deg),
+        true_deg=column(lambda run: run.true_deg),
+        edge_deg=column(lambda run: run.edge_deg),
+        shaft_deg=column(lambda run: run.shaft_deg),
+        latched_deg=column(lambda run: run.latched_deg),
+        tells_truth=all(run.tells_truth for run in runs),
+        triggers=sum(run.triggers for run in runs),
+        dropped={number: drop for run in runs for number, drop in run.dropped.items()},
+        record=runs[-1].record,
+    )
 
 
 class ReadingMotion(TableMotion):

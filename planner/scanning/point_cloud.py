@@ -1,11 +1,13 @@
 """Point clouds on disk, written continuously: PLY (binary) and XYZ (text). A file appears when it is closed."""
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import numpy as np
+from plyfile import PlyData
 
 from planner.arrays import FloatArray, IndexArray
 from protocol.whole_file import whole_file
@@ -13,6 +15,7 @@ from protocol.whole_file import whole_file
 # A vertex in the file. Single precision has an error of 0.03 micrometers at 500 mm.
 _COORDINATES = ("x", "y", "z", "beam_x", "beam_y", "beam_z")
 _VERTEX = np.dtype([*((name, "<f4") for name in _COORDINATES), ("profile", "<u4")])
+_WITH_NORMAL = ("x", "y", "z", "nx", "ny", "nz")
 
 
 class PlyWriter:
@@ -47,18 +50,12 @@ class PlyWriter:
 
     def _header(self) -> bytes:
         """Return the header, whose length does not depend on the number of points."""
-        lines = [
-            "ply",
-            "format binary_little_endian 1.0",
-            f"comment {self._comment}",
-            "comment x y z in mm in the workpiece's frame; beam: direction of the laser; profile: its number",
-            f"comment {'.' * (20 - len(str(self.count)))}",
-            f"element vertex {self.count}",
-            *(f"property float {name}" for name in _COORDINATES),
-            "property uint profile",
-            "end_header",
-        ]
-        return ("\n".join(lines) + "\n").encode("ascii", "replace")
+        comments = (
+            self._comment,
+            "x y z in mm in the workpiece's frame; beam: direction of the laser; profile: its number",
+            "." * (20 - len(str(self.count))),
+        )
+        return _header(comments, self.count, (*(f"float {name}" for name in _COORDINATES), "uint profile"))
 
     def __enter__(self) -> Self:
         return self
@@ -70,6 +67,34 @@ class PlyWriter:
         self._file.write(self._header())
         self._file.close()
         self._stack.close()
+
+
+def read_cloud(file: Path) -> tuple[FloatArray, FloatArray]:
+    """Return the points `(n, 3)` in mm and the directions of the laser `(n, 3)` of a file that `PlyWriter` wrote."""
+    with file.open("rb") as content:
+        vertices = PlyData.read(content, mmap=False)["vertex"].data
+    columns = np.column_stack([np.asarray(vertices[name], dtype=np.float64) for name in _COORDINATES])
+    return columns[:, :3], columns[:, 3:]
+
+
+def write_normals(file: Path, points: FloatArray, normals: FloatArray, comment: str = "") -> None:
+    """Write points `(n, 3)` in mm with their normals `(n, 3)` to a binary PLY file, for reconstruction programs."""
+    comments = (comment.replace("\n", " "), "x y z in mm in the workpiece's frame; nx ny nz: outward normal")
+    with whole_file(file) as partial:
+        header = _header(comments, len(points), tuple(f"float {name}" for name in _WITH_NORMAL))
+        partial.write_bytes(header + np.column_stack((points, normals)).astype("<f4").tobytes())
+
+
+def _header(comments: Sequence[str], count: int, properties: Sequence[str]) -> bytes:
+    lines = [
+        "ply",
+        "format binary_little_endian 1.0",
+        *(f"comment {comment}" for comment in comments),
+        f"element vertex {count}",
+        *(f"property {each}" for each in properties),
+        "end_header",
+    ]
+    return ("\n".join(lines) + "\n").encode("ascii", "replace")
 
 
 class XyzWriter:

@@ -8,10 +8,11 @@ from planner.scanning.calibration import AxisCalibration
 from planner.scanning.coverage import REASONS
 from planner.scanning.deviation_plots import deviation_figure
 from planner.scanning.error_budget import Contribution, ErrorBudget
+from planner.scanning.measuring import COVERED_MM
 from planner.scanning.probe import Sight
 from planner.scanning.probe_calibration import ProbeCalibration
 from planner.scanning.scan_plots import STATE_NAMES, budget_figure, coverage_figure
-from planner.scanning.scan_run import COVERED_MM, Scanned
+from planner.scanning.scan_run import Scanned
 from protocol.page import Origin, counted, figure, heading, page, paragraph, table, verdict
 
 _MICROMETERS = 1e3
@@ -19,10 +20,18 @@ _MICROMETERS = 1e3
 
 def scan_report(scanned: Scanned, origin: Origin | None = None) -> str:
     """Return the page of a scan."""
-    mesh, budget = scanned.scan.mesh, scanned.budget
     blocks = (
         verdict(verdict_of(scanned), scanned.is_whole),
         table(("", ""), list(_summary(scanned)), words=True),
+        *scan_blocks(scanned),
+    )
+    return page(f"Scan of {scanned.scan.name}", blocks, origin)
+
+
+def scan_blocks(scanned: Scanned) -> tuple[str, ...]:
+    """Return the parts of the page on the cloud, its errors, coverage, calibration and profiles."""
+    mesh, budget = scanned.scan.mesh, scanned.budget
+    return (
         heading("The cloud"),
         paragraph("The color shows the distance of the cloud from the surface, averaged locally; gray: not measured."),
         figure(
@@ -50,7 +59,6 @@ def scan_report(scanned: Scanned, origin: Origin | None = None) -> str:
         heading("Profiles"),
         table(("", ""), list(_profiles(scanned))),
     )
-    return page(f"Scan of {scanned.scan.name}", blocks, origin)
 
 
 def verdict_of(scanned: Scanned) -> str:

@@ -4,15 +4,14 @@ The workpiece is measured at its true position, at the true angle of the table, 
 difference is the error that the error budget divides among its sources.
 """
 
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Self
 
 import numpy as np
-import trimesh
 
-from planner.arrays import FloatArray
 from planner.cell.cell import placement
 from planner.cell.scan import Scan
 from planner.defaults import DEFAULT_PLANNER, RUN_ON_DEG
@@ -23,30 +22,33 @@ from planner.execution.execute import Settings
 from planner.execution.run_input import RunInput
 from planner.execution.stream import check_it_fits, stream
 from planner.execution.table_port import CONTROL_TIMEOUT_S, open_port
-from planner.geometry.ray_casting import RayCaster
+from planner.geometry.point_normals import point_normals
+from planner.geometry.thinned_cloud import ThinnedCloud
 from planner.planning.planners import PLANNERS
 from planner.planning.scan_planning import plan_scan
 from planner.plans.arm_check import PlannedArm, arm_fault
-from planner.scanning.alignment import Calibration, aligned, probe_poses
+from planner.scanning.alignment import Calibration
 from planner.scanning.calibration import AxisCalibration, PartSize
 from planner.scanning.coverage import Coverage
-from planner.scanning.error_budget import Chain, ErrorBudget, Samples, error_budget_of
+from planner.scanning.error_budget import Chain, ErrorBudget, error_budget_of
 from planner.scanning.latched_run import LatchedRun, TriggerConditions, run_latched
-from planner.scanning.point_cloud import PlyWriter, XyzWriter
-from planner.scanning.probe import LaserProbe, measure
+from planner.scanning.measuring import Measuring, known_poses
+from planner.scanning.point_cloud import PlyWriter, XyzWriter, write_normals
+from planner.scanning.pose_table import write_poses
+from planner.scanning.probe import LaserProbe
 from planner.scanning.probe_calibration import ProbeCalibration
 from planner.scanning.reference_sphere import calibrate_cell
+from planner.scanning.surface_mesh import save_surface, surface_mesh
 from planner.scanning.trigger_line import ProbeByHand, ProbeOnPort, TriggerLine
 from planner.table.wire import Wire
-from protocol import TableClient
+from protocol import Port, TableClient
 from protocol.bench import bench_of
 from protocol.control_channel import ControlChannel
 from protocol.progress import Progress, ProgressOf
 
-# Profiles that are measured at once: some 40 000 points.
-_BLOCK = 64
-# Profiles closer than this leave no gap.
-COVERED_MM = 2.0
+CLOUD_FILE, XYZ_FILE, POSES_FILE = "cloud.ply", "cloud.xyz", "poses.csv"
+# Cells of the thinned cloud, and how far the neighbors are that a normal is made from.
+_THINNED_MM, _NORMAL_MM = 0.5, 2.5
 
 
 class ScanError(PlannerError):
@@ -68,9 +70,16 @@ class ScanOptions(NamedTuple):
     angle_count: int = 360
     exact_calibration: bool = False
     xyz: bool = False
+    normals: bool = False
+    surface: Path | None = None
     probe: LaserProbe | None = None
     triggers: TriggerConditions = TriggerConditions()
     seed: int = 0
+
+    @property
+    def thinned_mm(self) -> float | None:
+        """Cells of the thinned cloud, where one is asked for."""
+        return _THINNED_MM if self.normals or self.surface is not None else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +109,13 @@ def _part_size(scan: Scan) -> PartSize:
 
 @dataclass(frozen=True, eq=False)
 class Scanned:
-    """The results of a scan."""
+    """What a scan came to.
+
+    Attributes:
+        planned: The motion, the first one of several.
+        run: What was latched, in all motions together.
+        dead_line: the consequences if the line had failed.
+    """
 
     scan: Scan
     options: ScanOptions
@@ -111,12 +126,8 @@ class Scanned:
     points: int
     coverage: Coverage
     budget: ErrorBudget
+    dead_line: DeadLine
     is_interrupted: bool
-
-    @property
-    def dead_line(self) -> DeadLine:
-        """The consequences if the line had failed."""
-        return judge_dead_line(self.planned.problem.map, self.planned.motion(), self.run.record)
 
     @property
     def is_whole(self) -> bool:
@@ -141,33 +152,62 @@ def planned_scan(scan: Scan, configuration: str, angle_count: int, progress: Pro
     return RunInput(scan.name, planned.plan, planned.problem, joints_deg, scan.cell.arm)
 
 
+class TableAtPort(NamedTuple):
+    """A table at an open port."""
+
+    port: Port
+    client: TableClient
+
+
+@contextmanager
+def table_at_port(options: ScanOptions) -> Iterator[TableAtPort]:
+    """Open the port of a scan for as long as the block lasts.
+
+    Raises:
+        TableError: It cannot be opened.
+    """
+    port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
+    with TableClient(port, options.timeout_s * options.time_scale, options.decimals) as client:
+        yield TableAtPort(port, client)
+
+
+def check_motion(planned: RunInput, options: ScanOptions) -> None:
+    """Refuse a motion that must not be made, or cannot be streamed.
+
+    Raises:
+        PlannerError: The table would run up or out through a forbidden region, or the commands do not fit the line.
+    """
+    wire = Wire(options.decimals, options.baud)
+    motion = planned.motion()
+    check_ends(planned.problem.map, motion)
+    check_it_fits(stream(motion, planned.problem.limits, wire, options.run_on_deg), wire)
+
+
 def run_on_port(planned: RunInput, options: ScanOptions, progress: ProgressOf) -> LatchedRun:
     """Return the values latched while the table at the port executed the motion.
 
     Raises:
-        PlannerError: the port allows no trigger, the serial line is too slow for the commands, or nothing was scanned.
-            Also if the run-up or the stop would cross a forbidden region.
-        TableError: the table does not reply, or did not reach the start.
+        PlannerError: The motion is refused, the port lets no trigger through, or nothing was scanned.
+        TableError: The table does not answer, or did not come to the start.
     """
-    wire = Wire(options.decimals, options.baud)
-    motion, limits = planned.motion(), planned.problem.limits
-    check_ends(planned.problem.map, motion)
-    check_it_fits(stream(motion, limits, wire, options.run_on_deg), wire)
-    port = open_port(options.port, options.baud, options.timeout_s, options.time_scale)
-    with TableClient(port, options.timeout_s * options.time_scale, options.decimals) as table:
-        line = _trigger_line(port, table, options)
-        settings = Settings(lag_s=options.lag_s, run_on_deg=options.run_on_deg)
-        return run_latched(
-            table,
-            line,
-            planned.plan,
-            planned.joints_deg,
-            limits,
-            wire,
-            options.triggers,
-            settings,
-            progress("motion"),
-        )
+    check_motion(planned, options)
+    with table_at_port(options) as table:
+        return run_on_table(table, planned, options, progress("motion"))
+
+
+def run_on_table(table: TableAtPort, planned: RunInput, options: ScanOptions, progress: Progress | None) -> LatchedRun:
+    """Return what was latched while the table made a motion that was checked; see `run_on_port`."""
+    return run_latched(
+        table.client,
+        _trigger_line(table.port, table.client, options),
+        planned.plan,
+        planned.joints_deg,
+        planned.problem.limits,
+        Wire(options.decimals, options.baud),
+        options.triggers,
+        Settings(lag_s=options.lag_s, run_on_deg=options.run_on_deg),
+        progress,
+    )
 
 
 def _trigger_line(port: object, table: TableClient, options: ScanOptions) -> TriggerLine:
@@ -193,67 +233,88 @@ def scan_workpiece(scan: Scan, options: ScanOptions, out: Path, progress: Progre
         TableError: the table does not reply.
         OSError: the folder cannot be written.
     """
+    probe = probe_of(scan, options)
+    knowledge = Knowledge.of(scan, probe, options.exact_calibration, options.seed)
+    planned = planned_scan(scan, options.configuration, options.angle_count, progress)
+    out.mkdir(parents=True, exist_ok=True)
+    run = run_on_port(planned, options, progress)
+    chain = chain_of(scan, knowledge, run)
+    work = Measuring(scan.mesh, probe, options.seed, options.thinned_mm)
+    with cloud_files(out, scan, options) as (ply, xyz):
+        measured = work.take(chain, ply, xyz, progress("profiles"))
+    dead_line = judge_dead_line(planned.problem.map, planned.motion(), run.record)
+    return finished(scan, options, probe, planned, knowledge, run, work, ply.count, dead_line, measured.is_whole, out)
+
+
+def probe_of(scan: Scan, options: ScanOptions) -> LaserProbe:
+    """Return the probe of a scan.
+
+    Raises:
+        ScanError: It is not fast enough.
+    """
     probe = options.probe or LaserProbe.of(scan.cell.probe)
     if options.triggers.rate_hz > probe.line_rate_hz:
         raise ScanError(
             f"a rate of {options.triggers.rate_hz:g} profiles a second is beyond the probe's {probe.line_rate_hz:g}"
         )
-    knowledge = Knowledge.of(scan, probe, options.exact_calibration, options.seed)
-    planned = planned_scan(scan, options.configuration, options.angle_count, progress)
-    out.mkdir(parents=True, exist_ok=True)
-    run = run_on_port(planned, options, progress)
+    return probe
+
+
+def chain_of(scan: Scan, knowledge: Knowledge, run: LatchedRun) -> Chain:
+    """Return a run with the true placements and those that are known."""
     arm = scan.cell.arm
-    chain = Chain(run, Calibration.of(scan.cell), knowledge.calibration, lambda deg: arm.flange_poses(arm.joints(deg)))
-    work = _Measuring(scan.mesh, probe, chain, options)
+    return Chain(run, Calibration.of(scan.cell), knowledge.calibration, lambda deg: arm.flange_poses(arm.joints(deg)))
+
+
+@contextmanager
+def cloud_files(out: Path, scan: Scan, options: ScanOptions) -> Iterator[tuple[PlyWriter, XyzWriter | None]]:
+    """Open the files of a cloud in `out`; they appear when they are closed."""
     with ExitStack() as files:
-        ply = files.enter_context(PlyWriter(out / "cloud.ply", f"seventh-axis scan {scan.name}, seed {options.seed}"))
-        xyz = files.enter_context(XyzWriter(out / "cloud.xyz")) if options.xyz else None
-        came_to_its_end = work.go(ply, xyz, progress("profiles"))
-    if not ply.count:
-        (out / "cloud.ply").unlink()
-        (out / "cloud.xyz").unlink(missing_ok=True)
+        ply = files.enter_context(PlyWriter(out / CLOUD_FILE, f"seventh-axis scan {scan.name}, seed {options.seed}"))
+        yield ply, files.enter_context(XyzWriter(out / XYZ_FILE)) if options.xyz else None
+
+
+def finished(
+    scan: Scan,
+    options: ScanOptions,
+    probe: LaserProbe,
+    planned: RunInput,
+    knowledge: Knowledge,
+    run: LatchedRun,
+    work: Measuring,
+    points: int,
+    dead_line: DeadLine,
+    is_whole: bool,
+    out: Path,
+) -> Scanned:
+    """Write what belongs to a cloud beside it, and return what the scan came to.
+
+    Raises:
+        ScanError: Nothing was scanned.
+    """
+    if not points:
+        (out / CLOUD_FILE).unlink()
+        (out / XYZ_FILE).unlink(missing_ok=True)
         raise ScanError(f"nothing was scanned: none of {len(run.numbers)} profiles meets the workpiece")
+    chain = chain_of(scan, knowledge, run)
+    T_BF = chain.flange_poses(run.joints_deg)
+    write_poses(out / POSES_FILE, run.numbers, run.times_s, run.angles_deg, run.joints_deg, T_BF, known_poses(chain))
+    if work.thinned is not None:
+        _write_surface(work.thinned, scan.name, options, out)
     budget = error_budget_of(chain, work.samples.all(), scan.mesh, 10.0**-options.decimals)
-    return Scanned(scan, options, probe, planned, knowledge, run, ply.count, work.coverage, budget, not came_to_its_end)
+    return Scanned(
+        scan, options, probe, planned, knowledge, run, points, work.coverage, budget, dead_line, not is_whole
+    )
 
 
-class _Measuring:
-    """The profiles of a run, processed in blocks from the probe to the cloud."""
-
-    def __init__(self, mesh: trimesh.Trimesh, probe: LaserProbe, chain: Chain, options: ScanOptions) -> None:
-        self.samples = Samples()
-        caster = RayCaster(mesh)
-        self.coverage = Coverage(mesh, caster, probe, COVERED_MM)
-        self._caster, self._probe, self._chain, self._seed = caster, probe, chain, options.seed
-
-    def go(self, ply: PlyWriter, xyz: XyzWriter | None, progress: Progress | None) -> bool:
-        """Measure, align and write all profiles; return False if Ctrl-C came before the last one."""
-        total = len(self._chain.run.numbers)
-        true_T_WS, known_T_WS = self._chain.poses(()), self._known_poses()
-        try:
-            for first in range(0, total, _BLOCK):
-                block = slice(first, first + _BLOCK)
-                self._measure(first, true_T_WS[block], known_T_WS[block], ply, xyz)
-                if progress is not None:
-                    progress(min(first + _BLOCK, total), total)
-        except KeyboardInterrupt:
-            return False
-        return True
-
-    def _known_poses(self) -> FloatArray:
-        """Return T_WS `(n, 4, 4)` only from the latched and the calibrated values."""
-        run, chain = self._chain.run, self._chain
-        return probe_poses(chain.known, chain.flange_poses(run.joints_deg), run.angles_deg)
-
-    def _measure(
-        self, first: int, true_T_WS: FloatArray, known_T_WS: FloatArray, ply: PlyWriter, xyz: XyzWriter | None
-    ) -> None:
-        numbers = self._chain.run.numbers[first : first + len(true_T_WS)]
-        seen = measure(self._caster, self._probe, true_T_WS, numbers, self._seed)
-        points = aligned(known_T_WS, seen.profiles, seen.points_S)
-        beams = np.einsum("ijk,ik->ij", known_T_WS[seen.profiles, :3, :3], seen.rays_S)
-        ply.write(points, beams, numbers[seen.profiles])
-        if xyz is not None:
-            xyz.write(points)
-        self.samples.take(first, seen)
-        self.coverage.take(true_T_WS)
+def _write_surface(cloud: ThinnedCloud, name: str, options: ScanOptions, out: Path) -> None:
+    """Write the thinned cloud with its normals, and the surface through it, as far as they were asked for."""
+    points = cloud.points
+    found = point_normals(points, cloud.beams, _NORMAL_MM)
+    if options.normals:
+        comment = f"seventh-axis scan {name}, seed {options.seed}, mean points of cells of {cloud.cell_mm:g} mm"
+        write_normals(out / "normals.ply", points[found.is_known], found.normals[found.is_known], comment)
+    if options.surface is not None:
+        save_surface(
+            options.surface, surface_mesh(points[found.is_known], found.normals[found.is_known], cloud.cell_mm)
+        )

@@ -25,7 +25,7 @@ def tracked_plan(scan: Scan, tracker: Tracker, observer: TrackRecord) -> tuple[P
         observer: what was decided, with at least two locations.
     """
     T_WS = np.stack(observer.T_WS[: observer.location_count])
-    scan = replace(scan, path=ScanPath(T_WS, scan.path.step_s))
+    scan = replace(scan, predefined_path=ScanPath(T_WS, scan.path.step_s))
     values, reasons = observer.columns()
     configuration = observer.configuration
     metadata = dict(tracker.map_metadata(T_WS)) | {"configuration": configuration.label}

@@ -18,13 +18,13 @@ from planner.arrays import FloatArray
 from planner.cell.bodies import FLANGE_FRAME
 from planner.cell.collision_model import collision_model
 from planner.cell.obstacles import workpiece_obstacle
+from planner.cell.pose_clearance import clearances
 from planner.cell.scan import Scan, load_scan
 from planner.geometry.mesh import sound_mesh
 from planner.geometry.signed_distance_field import build_field
 from planner.geometry.transforms import rotations_z
 from planner.geometry.winding_number import solid_angles
 from tests.planner import parts
-from tests.planner.clearances import clearances
 from tools.bench.timing import print_table
 
 MESHES: tuple[Callable[[int], trimesh.Trimesh], ...] = (

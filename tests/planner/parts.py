@@ -131,3 +131,33 @@ def perforated(triangles: int) -> trimesh.Trimesh:
 
 def knot(triangles: int) -> trimesh.Trimesh:
     return torus_knot(triangles // 50, 25)
+
+
+def impeller(blades: int = 7) -> trimesh.Trimesh:
+    """A disc with a hub and leaning blades, which stand on it: what lies under a blade is seen from beside it."""
+    outline = np.array([[0, 0], [60, 0], [60, 8], [18, 8], [18, 55], [0, 55.0]])
+    return joined(
+        trimesh.creation.revolve(outline, sections=72), *(_blade(2.0 * np.pi * k / blades) for k in range(blades))
+    )
+
+
+def _blade(azimuth: float, thickness_mm: float = 3.0, count: int = 9) -> trimesh.Trimesh:
+    """A blade from beside the hub outwards that leans over by 40 deg about the axis from bottom to top."""
+    away, up = np.meshgrid(np.linspace(20.0, 56.0, count), np.linspace(8.0, 45.0, count), indexing="ij")
+    turn = azimuth + np.radians(40.0) * (up - 8.0) / 37.0
+    across = np.stack((-np.sin(turn), np.cos(turn), np.zeros_like(turn)), axis=-1)
+    middle = np.stack((away * np.cos(turn), away * np.sin(turn), up), axis=-1)
+    sides = np.stack((middle - 0.5 * thickness_mm * across, middle + 0.5 * thickness_mm * across))
+    number = np.arange(sides[..., 0].size).reshape(sides.shape[:3])
+    quads = [_quads(number[0].T), _quads(number[1])]
+    quads += [_quads(number[:, 0].T), _quads(number[:, -1])]
+    quads += [_quads(number[:, :, 0]), _quads(number[:, :, -1].T)]
+    faces = np.concatenate([np.concatenate((quad[:, [0, 1, 2]], quad[:, [0, 2, 3]])) for quad in quads])
+    blade = trimesh.Trimesh(sides.reshape(-1, 3), faces, process=True)
+    trimesh.repair.fix_normals(blade)  # type: ignore[no-untyped-call] # trimesh has no types here
+    return blade
+
+
+def _quads(grid: IndexArray) -> IndexArray:
+    """The corners of the cells of a grid of vertices, around each cell."""
+    return np.stack((grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]), axis=-1).reshape(-1, 4)

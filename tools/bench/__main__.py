@@ -12,7 +12,9 @@ from importlib import import_module
 from protocol.command_line import Parser, program_name
 from protocol.ending import ended
 
-SUBJECTS = ("avr", "calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream", "track")
+SUBJECTS = (
+    "adaptive", "avr", "calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream", "track",
+)  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -28,6 +30,8 @@ def _run(options: argparse.Namespace, benches: Mapping[str, Callable[..., None]]
     for subject, bench in benches.items():
         if subject == "identify":
             bench(sys.stdout, options.plants, options.seed, options.jobs, options.pty, options.wide)
+        elif subject == "adaptive":
+            bench(sys.stdout, tuple(options.scan))
         elif subject == "track":
             bench(sys.stdout, options.pty)
         elif subject == "avr":
@@ -46,6 +50,10 @@ def parser() -> Parser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("subject", choices=SUBJECTS, nargs="+", help=f"what is measured, of {', '.join(SUBJECTS)}")
+    adaptive = parser.add_argument_group("for adaptive")
+    adaptive.add_argument(
+        "--scan", metavar="SCAN", action="append", default=[], help="a scan file (default: all shipped scans)"
+    )
     identify = parser.add_argument_group("for identify")
     parser.add_argument(
         "--pty", action="store_true", help="for identify and track: in real time, minutes on a quiet machine"

@@ -10,11 +10,11 @@ from planner.cell.bodies import FLANGE_FRAME, Bodies, load_bodies
 from planner.cell.cell import Cell, placement
 from planner.cell.collision_model import CollisionModel, collision_model
 from planner.cell.obstacles import Obstacle, box, cell_obstacles, cylinder, sphere, workpiece_obstacle
+from planner.cell.pose_clearance import Clearances, clearances
 from planner.cell.scan import load_scan
 from planner.cell.workpiece import Cylinder, Mould, Sphere
 from planner.geometry.solid import BOX, CYLINDER
 from planner.geometry.transforms import rotations_z
-from tests.planner.clearances import Clearances, clearances
 
 Poses = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ import trimesh
 from planner.cell.bodies import Bodies, load_bodies
 from planner.cell.cell import Cell, placement
 from planner.cell.collision_model import CollisionModel, collision_model
-from planner.cell.obstacles import Obstacle, cell_obstacles
+from planner.cell.obstacles import Obstacle, cell_obstacles, sphere
 from planner.geometry.box_distance import FIELD
 from planner.geometry.signed_distance_field import build_field
 
@@ -32,6 +32,14 @@ def test_each_pair_that_can_meet_is_looked_at_and_no_neighbors() -> None:
     ):
         assert neighbors not in names
         assert " and ".join(reversed(neighbors.split(" and "))) not in names
+
+
+def test_light_passes_what_does_not_stop_it_and_the_arm_does_not() -> None:
+    unseen = sphere("unseen space", 50.0, np.eye(4), turning=True)
+    _, solid_names = model_with(unseen)
+    _, names = model_with(unseen._replace(stops_light=False))
+    assert set(solid_names) - set(names) == {"beam and unseen space"}
+    assert "probe and unseen space" in names
 
 
 def test_one_mesh_is_all_a_model_takes() -> None:

@@ -69,5 +69,5 @@ def test_a_path_in_meters_or_radians_is_named(tmp_path: Path) -> None:
 
 def test_a_short_path_on_a_short_part_is_not_suspect() -> None:
     scan = load_scan("cylinder")
-    tiny = replace(scan, path=ScanPath(scan.path.T_WS[:2], 0.1), mesh=trimesh.creation.box((1.0, 1.0, 1.0)))
+    tiny = replace(scan, predefined_path=ScanPath(scan.path.T_WS[:2], 0.1), mesh=trimesh.creation.box((1.0, 1.0, 1.0)))
     assert unit_hint(tiny) is None

@@ -233,7 +233,7 @@ def test_a_plan_that_fails_leaves_no_plan_and_no_run_of_another(tmp_path: Path) 
 
 @pytest.mark.parametrize(
     ("command", "names"),
-    [("scan", ["cloud.ply", "cloud.xyz", "scan.json", "report.html"]), ("map", ["map.npz", "map.png"])],
+    [("scan", ["cloud.ply", "cloud.xyz", "poses.csv", "scan.json", "report.html"]), ("map", ["map.npz", "map.png"])],
 )
 def test_a_scan_or_map_that_fails_leaves_none_of_another(command: str, names: list[str], tmp_path: Path) -> None:
     for name in names:

@@ -55,7 +55,9 @@ def test_a_shipped_scan_gives_a_cloud_on_the_part_and_a_report(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["scan", name, *QUICK, "--rate", "5", "--out", str(tmp_path / "new")]) == 0
-    assert sorted(file.name for file in (tmp_path / "new").iterdir()) == ["cloud.ply", "report.html", "scan.json"]
+    assert sorted(file.name for file in (tmp_path / "new").iterdir()) == [
+        "cloud.ply", "poses.csv", "report.html", "scan.json",
+    ]  # fmt: skip
     document = scanned(tmp_path / "new")
     assert 0.0 < document["distance_mm"]["sigma"] < 0.2
     assert document["coverage"]["seen"] > 0.05
@@ -114,13 +116,27 @@ def test_the_same_command_gives_the_same_bytes_and_text_has_the_same_points(
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         monkeypatch.chdir(tmp_path / name)
-        assert main(["scan", scan_file, *QUICK, "--rate", "4", "--xyz", "--out", "out"]) == 0
+        assert main(["scan", scan_file, *QUICK, "--rate", "4", "--xyz", "--normals", "--out", "out"]) == 0
     first, second = tmp_path / "a" / "out", tmp_path / "b" / "out"
-    assert {file.name for file in first.iterdir()} == {"cloud.ply", "cloud.xyz", "scan.json", "report.html"}
+    assert {file.name for file in first.iterdir()} == {
+        "cloud.ply", "cloud.xyz", "normals.ply", "poses.csv", "scan.json", "report.html",
+    }  # fmt: skip
     for file in first.iterdir():
         assert file.read_bytes() == (second / file.name).read_bytes()
     points = np.loadtxt(first / "cloud.xyz")
     assert np.abs(points - cloud(first)).max() < 1e-4
+
+
+@pytest.mark.parametrize(("file", "words"), [("mesh.stl", "ends in .ply"), ("nowhere/mesh.ply", "no folder nowhere")])
+def test_a_surface_that_could_not_be_written_is_refused_before_the_scan(
+    file: str, words: str, scan_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert main(["scan", scan_file, "--surface", file, "--out", "out"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line
+    assert not (tmp_path / "out").exists()
 
 
 def test_another_mesh_takes_the_place_of_the_scans(scan_file: str, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from planner.cell.pose_clearance import clearances
 from planner.cell.scan import load_scan
 from planner.geometry.transforms import rotations_z
 from planner.kinematics.configuration import Configuration
@@ -19,7 +20,6 @@ from planner.map.map_builder import build_maps
 from planner.map.map_problem import MapProblem, map_problem
 from planner.map.map_reasons import FIRST_PAIR, FIRST_USER_FACTOR
 from planner.reasons import Reason
-from tests.planner.clearances import clearances
 from tests.planner.goals import goal_flange_poses
 
 Array = NDArray[np.float64]

@@ -150,7 +150,7 @@ def test_a_real_scan_with_a_rolling_probe_is_followed_or_refused(
     scan = load_scan("mould")
     rolled = scan.path.T_WS[:40] @ rotations_z(np.linspace(0.0, 39.0 * twist_deg, 40))
     cell = replace(scan.cell, T_BT=placement(*table_mm, 0.0, 0.0, 0.0))
-    scan = replace(scan, cell=cell, path=ScanPath(rolled, 1.0))
+    scan = replace(scan, cell=cell, predefined_path=ScanPath(rolled, 1.0))
     configuration = Configuration.LEFTY_ABOVE_NOFLIP
     problem = scan_problem(scan, build_maps(map_problem(scan), [configuration], 60)[configuration], None)
     outcome = plan_for_the_arm(problem)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from planner.scanning.point_cloud import PlyWriter, XyzWriter
+from planner.scanning.point_cloud import PlyWriter, XyzWriter, read_cloud, write_normals
 
 POINTS = np.random.default_rng(0).uniform(-300.0, 300.0, (1000, 3))
 BEAMS = POINTS / np.linalg.norm(POINTS, axis=1, keepdims=True)
@@ -42,6 +42,13 @@ def test_beams_and_profiles_are_beside_the_points(tmp_path: Path) -> None:
     assert (rows["profile"] == NUMBERS).all()
 
 
+def test_a_cloud_is_read_back(tmp_path: Path) -> None:
+    write(tmp_path / "cloud.ply", 300)
+    points, beams = read_cloud(tmp_path / "cloud.ply")
+    assert np.abs(points - POINTS).max() < 2e-5
+    assert np.abs(beams - BEAMS).max() < 1e-6
+
+
 def test_the_blocks_leave_no_trace(tmp_path: Path) -> None:
     write(tmp_path / "a.ply", 1000)
     write(tmp_path / "b.ply", 7)
@@ -75,3 +82,12 @@ def test_text_keeps_a_tenth_of_a_micrometer(tmp_path: Path) -> None:
         xyz.write(POINTS[600:])
         xyz.write(POINTS[:0])
     assert np.abs(np.loadtxt(tmp_path / "cloud.xyz") - POINTS).max() <= 0.5e-4 + 1e-9
+
+
+def test_another_program_reads_the_normals(tmp_path: Path) -> None:
+    write_normals(tmp_path / "normals.ply", POINTS, BEAMS, "two\nlines")
+    rows = properties(tmp_path / "normals.ply")
+    assert np.abs(np.column_stack([rows[f"n{axis}"] for axis in "xyz"]) - BEAMS).max() < 1e-6
+    cloud = trimesh.load(tmp_path / "normals.ply")
+    assert isinstance(cloud, trimesh.PointCloud)
+    assert np.abs(np.asarray(cloud.vertices) - POINTS).max() < 2e-5
