@@ -110,7 +110,7 @@ def scan_turned_over(
 
 
 def turned_over_document(turned: TurnedOver) -> dict[str, Any]:
-    """Return what `scan.json` tells of the second placement."""
+    """Return the second placement for `scan.json`."""
     document: dict[str, Any] = {
         "seen_of_whole": float(turned.seen.mean()),
         "seen_of_visible": float(turned.seen.sum() / max(1, turned.visible.sum())),
