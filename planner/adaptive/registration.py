@@ -1,4 +1,4 @@
-"""Join two clouds of one part that overlap: find the pose of the second in the frame of the first, or why there is none.
+"""Join two clouds of one part that overlap: find the pose of the second in the frame of the first, or why not.
 
 Generalized ICP (Segal, Haehnel and Thrun, 2009) by small_gicp, from many first guesses, so that a second pose that
 fits as well is found. Two things decide: the overlap, points of the second cloud that have a point of the first one
@@ -250,7 +250,7 @@ def _apart(T: FloatArray, other: FloatArray, cloud: Cloud) -> tuple[float, float
 
 
 def _weakest(found: Overlap, size_mm: float) -> float:
-    """Return the root mean square motion across the surface, of the rigid motion of 1 mm that the surface resists least.
+    """Return the RMS motion across the surface, of the rigid motion of 1 mm that the surface resists least.
 
     A rotation counts by how far it moves a place at half the part's size.
     """
