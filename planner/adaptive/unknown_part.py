@@ -167,7 +167,7 @@ class UnknownPart:
         return np.concatenate((straight, moved[much]))
 
     def _chosen(self, candidates: FloatArray, weights: FloatArray) -> list[Strip]:
-        """Return up to a batch of strips that the arm can sweep, each worth more after the one before than any other."""
+        """Return up to a batch of strips that the arm can sweep, the next always worth more than any other."""
         n, k = candidates.shape[:2]
         poses = allowed(self._surroundings, self.solid(), candidates.reshape(-1, 4, 4))
         turn = int(self._surroundings.limits.speed_deg_s * self._step_s / (360.0 / ANGLES))
