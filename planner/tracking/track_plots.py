@@ -60,7 +60,8 @@ def draw_decision_times(axes: Axes, record: TrackRecord) -> None:
 def _sampled(problem: Problem, step: Step) -> tuple[list[float], list[float]]:
     """Return locations and angles along a step and the kept motion after it."""
     locations, angles, state = [], [], step.start
-    for acceleration, end in ((step.acceleration_deg_s2, step.end), *step.kept):
+    moving = [(each.acceleration_deg_s2, each.end) for each in step.kept if not each.halts]
+    for acceleration, end in ((step.acceleration_deg_s2, step.end), *moving):
         for share in np.linspace(0.0, 1.0, _SUB_STEPS):
             time_s = float(share) * problem.step_s
             locations.append(state.location + float(share) * (end.location - state.location))

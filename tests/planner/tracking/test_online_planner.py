@@ -88,6 +88,31 @@ def test_a_decision_that_is_not_ready_lets_the_kept_motion_go_on() -> None:
     assert waiting.kind is Kind.WAIT
 
 
+def corridor(width: int = 19, drift: int = 8) -> ConfigurationMap:
+    """Return a map whose only allowed angles are a corridor that gets faster, up to some degrees a column.
+
+    It is so narrow that a table that follows it cannot brake along it: it would leave it behind.
+    """
+    values, first = np.zeros((40, 360)), 100
+    for k in range(40):
+        values[k, np.arange(first, first + width) % 360] = 0.8
+        first += min(drift, max(0, k - 3))
+    return ConfigurationMap(values)
+
+
+def test_in_a_corridor_too_fast_to_brake_along_the_table_halts_at_a_location_when_it_has_to() -> None:
+    map_ = corridor()
+    planner = begun_for_certain(map_, 12, Receding())
+    steps, blocked = tracked(planner, map_, lambda _: 99, lambda tick: tick % 9 < 7)
+    assert blocked is None
+    assert planner.is_finished
+    assert any(step.kept and step.kept[-1].halts for step in steps)
+    halts = [step for step in steps if step.kind is Kind.HALT]
+    assert halts
+    assert all(step.end.angle_deg == step.start.angle_deg and step.end.is_at_rest for step in halts)
+    assert [fault for step in steps for fault in faults(map_, step)] == []
+
+
 def test_a_wall_is_passed_by_a_pause_at_rest() -> None:
     map_ = blocks_map(30, 72, [(0, 14, 0, 35), (15, 29, 36, 71)])
     planner = begun_for_certain(map_, 8)
