@@ -28,6 +28,7 @@ def plot_track(problem: Problem, plan: Plan, record: TrackRecord, title: str, fo
     *maps, times = figure.subplots(len(moments) + 1, 1)
     for axes, step in zip(maps, moments, strict=True):
         draw_moment(axes, problem, plan, step)
+    maps[0].legend(loc="lower right", fontsize=8, frameon=True, ncols=2)
     maps[-1].set_xlabel("scan location")
     draw_decision_times(times, record)
     figure.suptitle(title)
