@@ -33,9 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     try:
         finished = track_scan(scan, arguments.out, asked, options.say, lambda label: progress_line(label, sys.stderr))
-        write_report(
-            arguments.out, arguments.out / REPORT_FILE, arguments.command_line, track_blocks(arguments.out)
-        )
+        write_report(arguments.out, arguments.out / REPORT_FILE, arguments.command_line, track_blocks(arguments.out))
     except TableError as error:
         raise PlannerError(str(error)) from error
     except OSError as error:
