@@ -173,7 +173,7 @@ def test_on_a_pty_a_program_sends_in_bursts_with_a_stall_and_the_table_waits(sca
                     time.sleep(0.05)
             with program:
                 program.sendall("".join(f"{line}\n" for line in sent[:10]).encode())
-                time.sleep(8.0)
+                time.sleep(14.0)  # the way to the start takes up to 8 s
                 program.sendall("".join(f"{line}\n" for line in sent[10:]).encode())
                 time.sleep(0.5)
 
