@@ -11,6 +11,7 @@ from planner.errors import PlannerError
 from planner.execution.run_report import write_report
 from planner.set_aside import set_aside
 from planner.tracking.track_file import decision_times_s
+from planner.tracking.track_report import track_blocks
 from planner.tracking.track_run import RESULTS, Finished, TrackOptions, track_scan
 from protocol import TableError
 from protocol.progress import progress_line
@@ -32,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     try:
         finished = track_scan(scan, arguments.out, asked, options.say, lambda label: progress_line(label, sys.stderr))
-        write_report(arguments.out, arguments.out / REPORT_FILE, arguments.command_line)
+        write_report(arguments.out, arguments.out / REPORT_FILE, arguments.command_line, track_blocks(arguments.out))
     except TableError as error:
         raise PlannerError(str(error)) from error
     except OSError as error:

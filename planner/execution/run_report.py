@@ -1,6 +1,6 @@
 """The HTML page of a run: verdict, figures, pictures as inline SVG, and all commands."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from planner.execution.run_file import StoredRun, load_run
@@ -20,8 +20,10 @@ _NAMES = {
 }
 
 
-def write_report(folder: Path, page: Path, command: str = "") -> None:
+def write_report(folder: Path, page: Path, command: str = "", further: Sequence[str] = ()) -> None:
     """Write the page of the run that a folder holds; `command` is the command line that asks for it.
+
+    Further blocks come after the summary.
 
     Raises:
         PlannerError: the folder holds no run, or it is damaged.
@@ -30,15 +32,16 @@ def write_report(folder: Path, page: Path, command: str = "") -> None:
     run = load_run(folder)
     conditions = run.conditions
     checked = verify_run(run.run_input, run.motion, run.record, conditions.lead_s, conditions.tolerance_deg)
-    write_whole(page, run_report(run, checked, command))
+    write_whole(page, run_report(run, checked, command, further))
 
 
-def run_report(run: StoredRun, checked: RunVerification, command: str = "") -> str:
-    """Return the page of a run; `command` is the command line that asks for it."""
+def run_report(run: StoredRun, checked: RunVerification, command: str = "", further: Sequence[str] = ()) -> str:
+    """Return the page of a run with further blocks; `command` is the command line that asks for it."""
     wire = run.conditions.wire
     blocks = (
         verdict(checked.verdict, checked.is_verified),
         table(("", ""), list(_summary(run, checked)), words=True),
+        *further,
         heading("On the configuration map"),
         paragraph("Gray is allowed (lighter is better); colors are forbidden. Both paths wrap at 360 deg."),
         figure(svg_of(map_figure(run, checked)), "Configuration map with the planned and the executed path."),

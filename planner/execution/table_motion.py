@@ -168,8 +168,8 @@ def _legs(plan: Plan, limits: Limits, pause_times: PauseTimes) -> Iterator[Leg]:
     for k, acceleration in enumerate(plan.accelerations_deg_s2):
         state = ReferenceState(float(plan.angles_deg[k]), float(plan.speeds_deg_s[k]))
         if k in waits_s:
-            yield Leg(Phase.WAIT, k, time_s, waits_s[k], state)
-            time_s += waits_s[k]
+            yield wait_leg(k, time_s, waits_s[k], state, limits)
+            time_s, state = time_s + waits_s[k], ReferenceState(state.angle_deg, 0.0)
         if k in paused:
             for leg in pause_legs(paused[k], time_s, state, limits, pause_times):
                 yield leg
@@ -180,9 +180,20 @@ def _legs(plan: Plan, limits: Limits, pause_times: PauseTimes) -> Iterator[Leg]:
     end = ReferenceState(float(plan.angles_deg[-1]), float(plan.speeds_deg_s[-1]))
     last = len(plan.accelerations_deg_s2)
     if last in waits_s:
-        yield Leg(Phase.WAIT, last, time_s, waits_s[last], end)
-        time_s += waits_s[last]
+        yield wait_leg(last, time_s, waits_s[last], end, limits)
+        time_s, end = time_s + waits_s[last], ReferenceState(end.angle_deg, 0.0)
     yield stop_leg(last, time_s, end, limits)
+
+
+def wait_leg(column: int, time_s: float, duration_s: float, start: ReferenceState, limits: Limits) -> Leg:
+    """Return the leg of a wait: at rest, or from a motion to rest at the angle where it begins."""
+    command = None if start.speed_deg_s == 0.0 else MotionCommand(start.angle_deg, *limits)
+    return Leg(Phase.WAIT, column, time_s, duration_s, start, command=command)
+
+
+def halt_s(start: ReferenceState, limits: Limits) -> float:
+    """Return how long the table needs to come to rest at the angle where it is in motion."""
+    return time_to_rest_s(start, MotionCommand(start.angle_deg, *limits)) + _SETTLING_S
 
 
 def stop_leg(column: int, time_s: float, end: ReferenceState, limits: Limits) -> Leg:

@@ -8,7 +8,7 @@ look-up. So a step over the angles [lowest, highest] is allowed exactly if every
 import numpy as np
 import numpy.typing as npt
 
-from planner.arrays import BoolArray
+from planner.arrays import BoolArray, FloatArray
 from planner.kernel import kernel
 from planner.map.config_map import sample_at_or_above, sample_at_or_below, wrapped
 from planner.table.motion import swept_angles
@@ -59,3 +59,26 @@ def step_is_allowed(
     """Return whether the table's motion from column `step` to the next is allowed, including both columns."""
     lowest, highest = swept_angles(angle_deg, speed_deg_s, acceleration_deg_s2, step_s)
     return crossing_is_allowed(runs, step, lowest, highest)
+
+
+@kernel
+def halt_is_allowed(
+    values: FloatArray, epsilon: float, column: int, angle_deg: float, way_deg: float, margin_deg: float
+) -> bool:
+    """Return whether the table may pass an angle by a signed way and come back while the probe stays at a column.
+
+    Args:
+        values: (n + 1, n_angles) of the map.
+        epsilon: maximum forbidden value.
+        column: the column.
+        angle_deg: where the table is to stand.
+        way_deg: how far it goes beyond, signed.
+        margin_deg: distance that is kept from what is forbidden.
+    """
+    count = values.shape[1]
+    lowest, highest = min(angle_deg, angle_deg + way_deg) - margin_deg, max(angle_deg, angle_deg + way_deg) + margin_deg
+    first, last = sample_at_or_below(lowest * (count / 360.0)), sample_at_or_above(highest * (count / 360.0))
+    for sample in range(first, min(last, first + count) + 1):
+        if values[column, wrapped(sample, count)] <= epsilon:
+            return False
+    return True

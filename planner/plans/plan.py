@@ -30,7 +30,10 @@ class Pause(NamedTuple):
 
 
 class Wait(NamedTuple):
-    """The table stands at a location, and the arm with it, before the scan goes on."""
+    """The table comes to rest at the angle of a location, and the arm waits there before the scan goes on from rest.
+
+    A table that arrives in motion brakes at its limit, passes the angle and comes back.
+    """
 
     location: int
     duration_s: float
@@ -111,6 +114,11 @@ class Plan:
             for pause in self.pauses
         )
         return replace(self, angles_deg=self.angles_deg + shifted_deg, pauses=pauses)
+
+    @property
+    def waiting(self) -> frozenset[int]:
+        """The locations from which the scan goes on from rest after a wait."""
+        return frozenset(wait.location for wait in self.waits)
 
     @property
     def configurations(self) -> list[str]:

@@ -15,17 +15,17 @@ def contradiction(plan: Plan) -> str | None:
     Args:
         plan: a plan of finite numbers, with one angle and one speed more than accelerations.
     """
-    paused = {pause.step for pause in plan.pauses}
+    paused, waiting = {pause.step for pause in plan.pauses}, plan.waiting
     for step, from_deg, to_deg, _ in plan.pauses:
         if not 0 <= step < len(plan.accelerations_deg_s2) or (from_deg, to_deg, 0.0) != (
             plan.angles_deg[step], plan.angles_deg[step + 1], plan.speeds_deg_s[step + 1]
         ):  # fmt: skip
             return f"the pause in step {step} contradicts the angles"
     for location, duration_s in plan.waits:
-        if not 0 <= location < len(plan.angles_deg) or not 0.0 < duration_s < np.inf or plan.speeds_deg_s[location]:
-            return f"the wait at location {location} contradicts the motion, which does not rest there"
+        if not 0 <= location < len(plan.angles_deg) or not 0.0 < duration_s < np.inf:
+            return f"the wait at location {location} is not one of a plan of {len(plan.angles_deg)} locations"
     for k, acceleration in enumerate(plan.accelerations_deg_s2):
-        angle, speed = float(plan.angles_deg[k]), float(plan.speeds_deg_s[k])
+        angle, speed = float(plan.angles_deg[k]), 0.0 if k in waiting else float(plan.speeds_deg_s[k])
         angle_error = plan.angles_deg[k + 1] - next_angle(angle, speed, float(acceleration), plan.step_s)
         speed_error = plan.speeds_deg_s[k + 1] - next_speed(speed, float(acceleration), plan.step_s)
         if k not in paused and max(abs(angle_error), abs(speed_error)) > _ROUNDING:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.map.config_map import column_value
-from planner.plans.crossing import step_is_allowed
+from planner.plans.crossing import halt_is_allowed, step_is_allowed
 from planner.plans.plan import Plan
 from planner.plans.problem import Problem
 
@@ -54,14 +54,18 @@ def verify(problem: Problem, plan: Plan) -> Verification:
 
 
 def _forbidden_steps(problem: Problem, plan: Plan) -> tuple[int, ...]:
-    terms, paused = problem.terms, {pause.step for pause in plan.pauses}
+    terms, paused, waiting = problem.terms, {pause.step for pause in plan.pauses}, plan.waiting
     forbidden = []
     for k, acceleration in enumerate(plan.accelerations_deg_s2):
         if k in paused:
             is_allowed = column_value(terms.values, terms.epsilon, k + 1, plan.angles_deg[k + 1]) > terms.epsilon
         else:
-            state = plan.angles_deg[k], plan.speeds_deg_s[k], acceleration
+            state = plan.angles_deg[k], 0.0 if k in waiting else plan.speeds_deg_s[k], acceleration
             is_allowed = step_is_allowed(terms.runs, k, *state, terms.step_s)
+        if k in waiting:
+            speed = plan.speeds_deg_s[k]
+            way_deg = 0.5 * speed * abs(speed) / terms.acceleration_limit_deg_s2
+            is_allowed &= halt_is_allowed(terms.values, terms.epsilon, k, plan.angles_deg[k], way_deg, 0.0)
         if not is_allowed:
             forbidden.append(k)
     return tuple(forbidden)

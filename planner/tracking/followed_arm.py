@@ -49,6 +49,18 @@ class FollowedArm:
         path = joint_path(self._cell.arm, solved, reasons, self._step_s, before)
         return None if path.step is not None else path.joints[0]
 
+    def begin(self, T_TF: FloatArray, angles_deg: FloatArray) -> FloatArray | None:
+        """Return the joints (6,) to begin a path with: on the turns that can follow it farthest; None: not its start.
+
+        Args:
+            T_TF: (n, 4, 4) the goals along the path.
+            angles_deg: (n,) the table's angles there.
+        """
+        solved, reasons = self._solve(T_TF, angles_deg)
+        reached = int(np.argmin(np.append(~np.isin(reasons, _UNSOLVED), False)))
+        path = joint_path(self._cell.arm, solved[:reached], reasons[:reached], self._step_s) if reached else None
+        return None if path is None or path.step == 0 else path.joints[0]
+
     def robot_deg(self, joints: FloatArray) -> FloatArray:
         """Return the robot's own angles (..., 6) of joints in radians."""
         return self._cell.arm.robot_deg(joints)

@@ -4,7 +4,7 @@ import math
 from collections import deque
 from collections.abc import Iterable
 
-from planner.execution.table_motion import Leg, PauseTimes, Phase, pause_legs, stop_leg
+from planner.execution.table_motion import Leg, PauseTimes, Phase, halt_s, pause_legs, stop_leg, wait_leg
 from planner.plans.plan import Pause
 from planner.table.motion import Limits
 from planner.tracking.online_planner import Kind, State, Step
@@ -51,12 +51,16 @@ class GrowingMotion:
         begin_s = self.decided_s
         legs = self._pause(step, begin_s) if step.kind is Kind.PAUSE else (self._leg(step, begin_s),)
         self.ticks = math.ceil(legs[-1].end_s / self._step_s - _ROUNDING_S)
-        if step.kind is not Kind.WAIT:
+        if step.kind in (Kind.SCAN, Kind.PAUSE):
             self._column_times_s.append(next(leg.end_s for leg in reversed(legs) if leg.phase is not Phase.WAIT))
         start, kept = step.end, []
-        for k, (acceleration, end) in enumerate(step.kept):
+        for k, (acceleration, end, halts) in enumerate(step.kept):
             begin = (self.ticks + k) * self._step_s
-            kept.append(Leg(Phase.SCAN, start.location, begin, self._step_s, _reference(start), acceleration))
+            kept.append(
+                self._halt(start, begin)
+                if halts
+                else Leg(Phase.SCAN, start.location, begin, self._step_s, _reference(start), acceleration)
+            )
             start = end
         self._kept = tuple(kept)
         self._add(legs)
@@ -87,9 +91,17 @@ class GrowingMotion:
         return self._column_times_s[max(place, 0)] if place < len(self._column_times_s) else math.inf
 
     def _leg(self, step: Step, begin_s: float) -> Leg:
+        if step.kind is Kind.HALT:
+            return self._halt(step.start, begin_s)
         phase = Phase.WAIT if step.kind is Kind.WAIT else Phase.SCAN
         column, state = step.start.location, _reference(step.start)
         return Leg(phase, column, begin_s, self._step_s, state, step.acceleration_deg_s2)
+
+    def _halt(self, start: State, begin_s: float) -> Leg:
+        """Return the leg that brings the table to rest at the angle where it is, in whole steps."""
+        state = _reference(start)
+        steps = math.ceil(halt_s(state, self._limits) / self._step_s - _ROUNDING_S)
+        return wait_leg(start.location, begin_s, steps * self._step_s, state, self._limits)
 
     def _pause(self, step: Step, begin_s: float) -> tuple[Leg, ...]:
         """Return the legs of a pause, and a wait until the time step in which it ends is over."""

@@ -22,6 +22,7 @@ from planner.plans.problem import Terms
 from planner.table.motion import next_angle, next_speed
 from planner.tracking.decision import Candidate, Method, safe_candidates
 from planner.tracking.followed_arm import FollowedArm
+from planner.tracking.rest_motion import HALT
 from planner.tracking.revealed_map import RevealedMap
 
 _STANDING_DEG_S = 1e-9
@@ -37,6 +38,7 @@ class Kind(StrEnum):
 
     SCAN = "scan"
     WAIT = "wait"
+    HALT = "halt"
     PAUSE = "pause"
 
 
@@ -68,6 +70,8 @@ class KeptStep(NamedTuple):
 
     acceleration_deg_s2: float
     end: State
+    halts: bool = False
+    """Whether the table comes to rest at the location where it is: it passes the angle and comes back."""
 
 
 class Step(NamedTuple):
@@ -208,6 +212,10 @@ class OnlinePlanner:
 
     def _path_of(self, candidate: Candidate, step_s: float) -> list[KeptStep]:
         """Return a step and its braking to rest; the speed at the end is exactly 0."""
+        if candidate.braking_steps == HALT:
+            state = self._after(candidate.acceleration_deg_s2, step_s)
+            halt = KeptStep(0.0, state._replace(speed_deg_s=0.0), halts=True)
+            return [KeptStep(candidate.acceleration_deg_s2, state), halt]
         state, path = self.state, []
         for k in range(1 + candidate.braking_steps):
             if k == 1:
@@ -220,25 +228,32 @@ class OnlinePlanner:
             path.append(KeptStep(float(a), state))
         return path
 
+    def _after(self, acceleration_deg_s2: float, step_s: float) -> State:
+        location, angle_deg, speed_deg_s, _ = self.state
+        angle = next_angle(angle_deg, speed_deg_s, acceleration_deg_s2, step_s)
+        return State(location + 1, angle, next_speed(speed_deg_s, acceleration_deg_s2, step_s))
+
     def _followed(self, path: list[KeptStep]) -> list[KeptStep] | None:
         """Return the path with the arm's joints; None where the arm cannot follow all of it."""
         if self._arm is None:
             return path
         assert self._goals is not None
         assert self.state.joints is not None
-        goals = self._goals(path[0].end.location, path[-1].end.location)
-        angles = np.array([each.end.angle_deg for each in path])
+        moving = [each for each in path if not each.halts]
+        goals = self._goals(moving[0].end.location, moving[-1].end.location)
+        angles = np.array([each.end.angle_deg for each in moving])
         joints = self._arm.follow(self.state.joints, goals, angles)
         if joints is None:
             return None
-        return [each._replace(end=each.end._replace(joints=row)) for each, row in zip(path, joints, strict=True)]
+        rows = [*joints, joints[-1]][: len(path)]
+        return [each._replace(end=each.end._replace(joints=row)) for each, row in zip(path, rows, strict=True)]
 
     def _go_on(self, why: Why) -> Step:
         """Take the first step of the kept motion."""
-        start, (acceleration, end) = self.state, self._kept.popleft()
+        start, (acceleration, end, halts) = self.state, self._kept.popleft()
         self.state = end
         self.revealed.forget_before(end.location)
-        return Step(Kind.SCAN, why, start, end, acceleration, self.revealed.last, self.kept)
+        return Step(Kind.HALT if halts else Kind.SCAN, why, start, end, acceleration, self.revealed.last, self.kept)
 
     def _wait(self, why: Why) -> Step:
         return Step(Kind.WAIT, why, self.state, self.state, 0.0, self.revealed.last, ())

@@ -1,4 +1,4 @@
-"""Motions that come to rest within the columns in view, by equal braking, and touch nothing forbidden.
+"""Motions that come to rest within the columns in view and touch nothing forbidden: equal braking, or a halt.
 
 They make tracking safe. A step is taken only if such a motion exists from its end. After one step of such a motion, the
 rest of it is such a motion again. So the table can come to rest from every state that it reaches, whatever becomes
@@ -9,11 +9,12 @@ import numpy as np
 
 from planner.arrays import FloatArray, IndexArray
 from planner.kernel import kernel
-from planner.plans.crossing import crossing_is_allowed
+from planner.plans.crossing import crossing_is_allowed, halt_is_allowed
 from planner.plans.problem import Terms
 from planner.table.motion import next_angle, next_speed, swept_angles
 
-NO_REST = -1
+NO_REST, HALT = -1, -2
+"""No way to rest; and: the arm stays at the location, while the table passes its angle, brakes and comes back."""
 # Additions leave this much of a speed that is zero, and of an acceleration that is the limit.
 _STANDING_DEG_S = 1e-9
 _ROUNDING = 1e-9
@@ -79,7 +80,8 @@ def rests_after(
 ) -> IndexArray:
     """Return (n,) how many steps of braking lead to rest after one step of each acceleration from column 0.
 
-    NO_REST where the step itself, or every way to rest after it, breaks a limit or meets what is forbidden.
+    HALT where braking along the path serves nowhere, but halting at the next location does. NO_REST where the step
+    itself, or every way to rest after it, breaks a limit or meets what is forbidden.
     """
     rests = np.empty(len(accelerations_deg_s2), dtype=np.int64)
     for i in range(len(accelerations_deg_s2)):
@@ -89,4 +91,13 @@ def rests_after(
             angle = next_angle(angle_deg, speed_deg_s, a, terms.step_s)
             speed = next_speed(speed_deg_s, a, terms.step_s)
             rests[i] = braking_steps(terms, 1, last, angle, speed, margin_deg)
+            way_deg = 0.5 * speed * abs(speed) / terms.acceleration_limit_deg_s2
+            least = np.ceil(abs(speed) / (terms.acceleration_limit_deg_s2 * terms.step_s) - _ROUNDING)
+            # Towards the end of the view the table brakes along the path, not at its limit.
+            if (
+                rests[i] == NO_REST
+                and least <= last - 1
+                and halt_is_allowed(terms.values, terms.epsilon, 1, angle, way_deg, margin_deg)
+            ):
+                rests[i] = HALT
     return rests

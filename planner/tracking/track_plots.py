@@ -28,6 +28,7 @@ def plot_track(problem: Problem, plan: Plan, record: TrackRecord, title: str, fo
     *maps, times = figure.subplots(len(moments) + 1, 1)
     for axes, step in zip(maps, moments, strict=True):
         draw_moment(axes, problem, plan, step)
+    maps[0].legend(loc="lower right", fontsize=8, frameon=True, ncols=2)
     maps[-1].set_xlabel("scan location")
     draw_decision_times(times, record)
     figure.suptitle(title)
@@ -60,7 +61,8 @@ def draw_decision_times(axes: Axes, record: TrackRecord) -> None:
 def _sampled(problem: Problem, step: Step) -> tuple[list[float], list[float]]:
     """Return locations and angles along a step and the kept motion after it."""
     locations, angles, state = [], [], step.start
-    for acceleration, end in ((step.acceleration_deg_s2, step.end), *step.kept):
+    moving = [(each.acceleration_deg_s2, each.end) for each in step.kept if not each.halts]
+    for acceleration, end in ((step.acceleration_deg_s2, step.end), *moving):
         for share in np.linspace(0.0, 1.0, _SUB_STEPS):
             time_s = float(share) * problem.step_s
             locations.append(state.location + float(share) * (end.location - state.location))

@@ -66,7 +66,7 @@ class TrackRecord:
             return
         self.decision_s.append(seconds)
         self.whys[step.why] += 1
-        if step.kind is Kind.WAIT:
+        if step.kind in (Kind.WAIT, Kind.HALT):
             location = step.end.location
             self._waits[location] = self._waits.get(location, 0.0) + leg.duration_s
             return

@@ -283,7 +283,8 @@ class Tracker(FollowedReference):
                 "location 0 has no table angle at which the arm may hold the probe, mostly because of"
                 f" {reason}; begin the path elsewhere, or move the workpiece"
             )
-        return min(possible, key=lambda each: each[0])[1]
+        start = min(possible, key=lambda each: each[0])[1]
+        return start._replace(joints=self._joints_to_begin_with(start))
 
     def begin(self, start: Start, turns: int = 0) -> tuple[Column, ...]:
         """Begin at a start, full turns of the table farther, and return the columns that are known."""
@@ -478,6 +479,23 @@ class Tracker(FollowedReference):
             revealed.reveal(column)
         columns = zip(self._known, values[0], reasons[0], strict=True)
         return revealed, tuple(Column(first + k, known.T_WS, v, r) for k, (known, v, r) in enumerate(columns))
+
+    def _joints_to_begin_with(self, start: Start) -> FloatArray:
+        """Return the joints at a start on the turns that serve longest on the way through the first view."""
+        rater = ColumnRater(self._problem, [start.configuration], self._angle_count)
+        preview = OnlinePlanner(
+            self._revealed(rater, 0)[0],
+            METHODS[self._settings.planner](),
+            State(0, start.angle_deg, 0.0),
+            self._settings.margin_deg,
+            resume_columns=1,
+        )
+        preview.ended, states = True, [preview.state]
+        while not preview.is_finished and isinstance(step := preview.step(), Step) and step.kind is Kind.SCAN:
+            states.append(step.end)
+        angles = np.array([state.angle_deg for state in states])
+        joints = self._arm(start.configuration).begin(self._goals(0, len(states) - 1), angles)
+        return start.joints if joints is None else joints
 
     def _start_in(self, c: int, values: FloatArray, reasons: CodeArray) -> tuple[float, Start] | None:
         """Return the cost of the best start in a configuration, and the start; None where there is none."""

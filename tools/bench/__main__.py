@@ -8,6 +8,7 @@ import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
+from pathlib import Path
 
 from protocol.command_line import Parser, program_name
 from protocol.ending import ended
@@ -33,7 +34,7 @@ def _run(options: argparse.Namespace, benches: Mapping[str, Callable[..., None]]
         elif subject == "adaptive":
             bench(sys.stdout, tuple(options.scan))
         elif subject == "track":
-            bench(sys.stdout, options.pty)
+            bench(sys.stdout, options.pty, options.plot)
         elif subject == "avr":
             bench(sys.stdout, options.ticks, options.lines, options.seed)
         else:
@@ -54,6 +55,7 @@ def parser() -> Parser:
     adaptive.add_argument(
         "--scan", metavar="SCAN", action="append", default=[], help="a scan file (default: all shipped scans)"
     )
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="for track: picture of cost and pauses over the view")
     identify = parser.add_argument_group("for identify")
     parser.add_argument(
         "--pty", action="store_true", help="for identify and track: in real time, minutes on a quiet machine"

@@ -35,9 +35,10 @@ from planner.tracking.revealed_map import RevealedMap
 from planner.tracking.tracker import Tracker, TrackSettings
 from protocol.own_program import own_environment, own_program
 from tools.bench.timing import percentile, print_table
+from tools.bench.track_plot import plot_views
 
 VIEWS = (10, 20, 50, 100)
-WITHHELD = 200
+WITHHELD = 50
 LONG_PATH = 10_000
 PTY_S = 600.0
 _STEP_S, _MARGIN_DEG, _SUB_STEPS = 0.25, 0.1, 16
@@ -59,10 +60,10 @@ class Track(NamedTuple):
     tracker: Tracker
 
 
-def bench(stream: TextIO, pty: bool = False) -> None:
-    """Print every figure of tracking; with `pty` those in real time too."""
+def bench(stream: TextIO, pty: bool = False, picture: Path | None = None) -> None:
+    """Print every figure of tracking; with `pty` those in real time too; draw cost and pauses into `picture`."""
     _bench_decisions(stream)
-    _bench_views(stream)
+    _bench_views(stream, picture)
     _bench_withheld(stream)
     _bench_long_path(stream)
     if pty:
@@ -153,8 +154,8 @@ def _longer(scan: Scan, count: int) -> FloatArray:
     return there_and_back[np.arange(count) % len(there_and_back)]
 
 
-def _bench_views(out: TextIO) -> None:
-    rows = []
+def _bench_views(out: TextIO, picture: Path | None = None) -> None:
+    rows, ratios = [], {}
     for name in shipped_scans():
         scan = load_scan(name)
         map_ = build_maps(map_problem(scan), [_CONFIGURATION], 360)[_CONFIGURATION]
@@ -164,15 +165,18 @@ def _bench_views(out: TextIO) -> None:
         for planner in (RECEDING, RAY_SHOOTING):
             tracks = [track(scan, scan.path.T_WS, TrackSettings(planner, view)) for view in VIEWS]
             offline = planner_named(planner)(problem)
-            ratios = [
-                f"{cost_of(problem, each.steps) / best.cost.total:.3f}"
-                + (f" ({n})" if (n := sum(step.kind is Kind.PAUSE for step in each.steps)) else "")
+            found = [
+                (cost_of(problem, each.steps) / best.cost.total, sum(step.kind is Kind.PAUSE for step in each.steps))
                 for each in tracks
             ]
+            ratios[f"{name}, {planner}"] = found
             known = f"{offline.cost.total / best.cost.total:.3f}" if isinstance(offline, Plan) else "-"
-            rows.append((f"{name}, {planner}", *ratios, known))
+            shown = [f"{ratio:.3f}" + (f" ({pauses})" if pauses else "") for ratio, pauses in found]
+            rows.append((f"{name}, {planner}", *shown, known))
     header = ("scan, planner", *(f"{view} in view" for view in VIEWS), "offline")
     print_table(out, "Cost over the optimum with full knowledge and a free start (pauses)", header, rows)
+    if picture is not None:
+        plot_views(VIEWS, ratios, picture)
 
 
 def _bench_withheld(out: TextIO) -> None:
@@ -182,7 +186,7 @@ def _bench_withheld(out: TextIO) -> None:
         scan = load_scan(name)
         map_ = build_maps(map_problem(scan), [_CONFIGURATION], 360)[_CONFIGURATION]
         tally = [0, 0, 0, 0]
-        for withheld, stall in _withholdings(generator, map_.location_count, 50):
+        for withheld, stall in _withholdings(generator, map_.location_count, WITHHELD):
             sent = _sent_by(withheld, stall)
             one = track(scan, scan.path.T_WS, TrackSettings(view=20), sent)
             _count(tally, map_, one.steps, withheld, scan.path.step_s, one.tracker.state.location)
@@ -199,7 +203,7 @@ def _bench_withheld(out: TextIO) -> None:
         "runs",
         "not at rest in view",
         "forbidden steps",
-        "went on to the end or a blocked column",
+        "went on",
     )
     print_table(out, "Locations withheld at random moments, 20 columns in view", header, rows)
 
@@ -230,7 +234,8 @@ def _touches(map_: ConfigurationMap, step: Step, step_s: float) -> bool:
     state = step.start
     if step.kind is not Kind.SCAN:
         return not map_.is_allowed(step.end.location, step.end.angle_deg)
-    for acceleration, end in ((step.acceleration_deg_s2, step.end), *step.kept):
+    moving = [(each.acceleration_deg_s2, each.end) for each in step.kept if not each.halts]
+    for acceleration, end in ((step.acceleration_deg_s2, step.end), *moving):
         for share in np.linspace(0.0, 1.0, _SUB_STEPS + 1):
             t = float(share) * step_s
             angle = state.angle_deg + state.speed_deg_s * t + 0.5 * acceleration * t * t

@@ -60,6 +60,19 @@ def test_the_path_of_a_scan_is_tracked_verified_and_recorded(
     assert all(each["rest"]["location"] <= each["last_known"] for each in tracked["moments"])
     assert tracked["price"]["tracked"] >= tracked["price"]["known"] > 0.0
     assert document_in(out, "run.json")["deviations"]["reference"]["at_locations_deg"] < 0.05
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "price of not knowing" in page
+    assert "data:image/png;base64," in page
+
+
+def test_a_damaged_record_of_the_decisions_is_named(
+    scan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "track"
+    assert track(scan_file, out) == 0
+    (out / "track.json").write_text("{}", encoding="utf-8")
+    assert main(["show", str(out)]) == 2
+    assert "track.json: is damaged: KeyError" in capsys.readouterr().err
 
 
 def test_the_motion_that_was_tracked_can_be_run_as_a_plan(scan_file: Path, tmp_path: Path) -> None:
@@ -110,7 +123,9 @@ def test_a_bad_location_on_the_way_is_named_in_one_line(
     verdict = capsys.readouterr().out.splitlines()[0]
     assert verdict.startswith("stopped: ")
     assert message in verdict
-    assert document_in(tmp_path / "track", "plan.json")["table"]["speeds_deg_s"][-1] == 0.0
+    table = document_in(tmp_path / "track", "plan.json")["table"]
+    halted = {wait["location"] for wait in table.get("waits", ())}
+    assert table["speeds_deg_s"][-1] == 0.0 or len(table["speeds_deg_s"]) - 1 in halted
 
 
 @pytest.mark.parametrize(
@@ -158,7 +173,7 @@ def test_on_a_pty_a_program_sends_in_bursts_with_a_stall_and_the_table_waits(sca
                     time.sleep(0.05)
             with program:
                 program.sendall("".join(f"{line}\n" for line in sent[:10]).encode())
-                time.sleep(8.0)
+                time.sleep(14.0)  # the way to the start takes up to 8 s
                 program.sendall("".join(f"{line}\n" for line in sent[10:]).encode())
                 time.sleep(0.5)
 

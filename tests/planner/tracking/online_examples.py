@@ -9,6 +9,7 @@ from planner.table.motion import Limits
 from planner.tracking.decision import Method, Receding, costs_of_starts
 from planner.tracking.online_planner import Blocked, Kind, OnlinePlanner, State, Step, may_rest
 from planner.tracking.revealed_map import RevealedMap
+from protocol.trapezoid import MotionCommand, ReferenceState, advance, time_to_rest_s
 
 STEP_S = 0.25
 MARGIN_DEG = 0.1
@@ -55,28 +56,53 @@ def tracked(
 def faults(map_: ConfigurationMap, step: Step, limits: Limits | None = None) -> list[str]:
     """Return what is wrong with a step and the motion to rest that was kept after it, by look-ups between columns."""
     limits = limits or Limits()
+    if step.kind is Kind.HALT:
+        return _faults_of_halt(map_, step.start, limits)
     if step.kind is not Kind.SCAN:
         is_free = _is_free(map_, step.end.location, [step.end.angle_deg + d for d in (-MARGIN_DEG, 0.0, MARGIN_DEG)])
         return [] if is_free and step.end.is_at_rest else [f"no rest at {step.end}"]
-    found, state = [], step.start
-    for acceleration, end in ((step.acceleration_deg_s2, step.end), *step.kept):
+    found: list[str] = []
+    state = step.start
+    for acceleration, end, halts in ((step.acceleration_deg_s2, step.end, False), *step.kept):
+        if halts:
+            found += _faults_of_halt(map_, state, limits)
+            state = end
+            continue
         if end.location > step.last_known:
             found.append(f"a step to location {end.location}, and {step.last_known} is the last known")
-        times = np.linspace(0.0, STEP_S, SUB_STEPS + 1)
-        angles = state.angle_deg + state.speed_deg_s * times + 0.5 * acceleration * times**2
-        if abs(angles[-1] - end.angle_deg) + abs(state.speed_deg_s + acceleration * STEP_S - end.speed_deg_s) > 1e-6:
-            found.append(f"Eq. (3), (4) do not lead from {state} to {end}")
-        if abs(acceleration) > limits.acceleration_deg_s2 + 1e-6 or abs(end.speed_deg_s) > limits.speed_deg_s + 1e-6:
-            found.append(f"a limit is exceeded on the way to {end}")
-        for share, angle in zip(times / STEP_S, angles, strict=True):
-            around = [angle + d for d in (-MARGIN_DEG, 0.0, MARGIN_DEG)]
-            if not _is_free(map_, state.location + float(share), around):
-                found.append(f"{angle:.2f} deg between {state.location} and {end.location} is forbidden")
-                break
+        found += _faults_of_motion(map_, state, acceleration, end, limits)
         state = end
     if not state.is_at_rest:
         found.append(f"the kept motion ends at {state.speed_deg_s} deg/s")
     return found
+
+
+def _faults_of_motion(
+    map_: ConfigurationMap, state: State, acceleration_deg_s2: float, end: State, limits: Limits
+) -> list[str]:
+    """Return what is wrong with one step of constant acceleration."""
+    found, times = [], np.linspace(0.0, STEP_S, SUB_STEPS + 1)
+    angles = state.angle_deg + state.speed_deg_s * times + 0.5 * acceleration_deg_s2 * times**2
+    speed_error = state.speed_deg_s + acceleration_deg_s2 * STEP_S - end.speed_deg_s
+    if abs(angles[-1] - end.angle_deg) + abs(speed_error) > 1e-6:
+        found.append(f"Eq. (3), (4) do not lead from {state} to {end}")
+    if max(abs(acceleration_deg_s2) - limits.acceleration_deg_s2, abs(end.speed_deg_s) - limits.speed_deg_s) > 1e-6:
+        found.append(f"a limit is exceeded on the way to {end}")
+    for share, angle in zip(times / STEP_S, angles.tolist(), strict=True):
+        if not _is_free(map_, state.location + float(share), [angle - MARGIN_DEG, angle, angle + MARGIN_DEG]):
+            return [*found, f"{angle:.2f} deg between {state.location} and {end.location} is forbidden"]
+    return found
+
+
+def _faults_of_halt(map_: ConfigurationMap, start: State, limits: Limits) -> list[str]:
+    """Return what is wrong with coming to rest at the angle where the table is, by the controller's own rules."""
+    command = MotionCommand(start.angle_deg, *limits)
+    reference = ReferenceState(start.angle_deg, start.speed_deg_s)
+    for time_s in np.linspace(0.0, time_to_rest_s(reference, command), 4 * SUB_STEPS):
+        angle = advance(reference, command, float(time_s)).angle_deg
+        if not _is_free(map_, start.location, [angle - MARGIN_DEG, angle, angle + MARGIN_DEG]):
+            return [f"{angle:.2f} deg is forbidden during the halt at {start.location}"]
+    return []
 
 
 def _is_free(map_: ConfigurationMap, location: float, angles_deg: Sequence[float]) -> bool:

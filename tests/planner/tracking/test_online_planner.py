@@ -14,7 +14,7 @@ from planner.plans.plan import Pause, Plan, path_cost
 from planner.plans.problem import Problem
 from planner.table.motion import Limits
 from planner.tracking.decision import Method, RayShooting, Receding
-from planner.tracking.online_planner import Blocked, Kind, OnlinePlanner, Why
+from planner.tracking.online_planner import Blocked, Kind, OnlinePlanner, Step, Why
 from planner.tracking.revealed_map import WindowError
 from tests.planner.tracking.online_examples import STEP_S, begun, faults, tracked
 
@@ -86,6 +86,38 @@ def test_a_decision_that_is_not_ready_lets_the_kept_motion_go_on() -> None:
     waiting = planner.step(may_decide=False)
     assert not isinstance(waiting, Blocked)
     assert waiting.kind is Kind.WAIT
+
+
+def corridor(width: int = 19, drift: int = 8) -> ConfigurationMap:
+    """Return a map whose only allowed angles are a corridor that gets faster, up to some degrees a column.
+
+    It is so narrow that a table that follows it cannot brake along it: it would leave it behind.
+    """
+    values, first = np.zeros((40, 360)), 100
+    for k in range(40):
+        values[k, np.arange(first, first + width) % 360] = 0.8
+        first += min(drift, max(0, k - 3))
+    return ConfigurationMap(values)
+
+
+def test_in_a_corridor_too_fast_to_brake_along_the_table_halts_at_a_location_when_it_has_to() -> None:
+    map_ = corridor()
+    planner = begun_for_certain(map_, 12, Receding())
+    steps: list[Step] = []
+    for _ in range(map_.location_count):
+        steps += tracked(planner, map_, lambda _: 99, ticks=1)[0]
+        if planner.kept and planner.kept[-1].halts:
+            break
+    while planner.kept:
+        step = planner.step(may_decide=False)
+        assert not isinstance(step, Blocked)
+        steps.append(step)
+    assert steps[-1].kind is Kind.HALT
+    assert not steps[-1].start.is_at_rest
+    assert steps[-1].end == steps[-1].start._replace(speed_deg_s=0.0)
+    steps += tracked(planner, map_, lambda _: 99)[0]
+    assert planner.is_finished
+    assert [fault for step in steps for fault in faults(map_, step)] == []
 
 
 def test_a_wall_is_passed_by_a_pause_at_rest() -> None:
