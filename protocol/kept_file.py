@@ -88,7 +88,8 @@ def made_by_one(file: Path) -> Iterator[None]:
         _wait_for(descriptor)
         yield
     finally:
-        claim.unlink(missing_ok=True)
+        with suppress(OSError):
+            claim.unlink()
         os.close(descriptor)
 
 

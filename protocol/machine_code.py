@@ -35,11 +35,16 @@ _INLINED_OPTIONS = {"error_model": "numpy", "forceinline": True}
 
 # Numba numbers what it compiles from 1 in each process, and puts the numbers into the names of symbols. In a process
 # that loads what others have compiled, calls of one function would end in another one of the same name and number.
+_NAMES_ARE_OURS = hasattr(
+    FunctionIdentity, "_unique_ids"
+)  # where another numba numbers in another way, nothing is kept
 FunctionIdentity._unique_ids = iter(partial(secrets.randbits, 63), 0)  # noqa: SLF001  # there is no option
 
 
 def compiled(function: Callable[..., Any]) -> Any:  # noqa: ANN401  # numba's dispatcher
     """Return `function` compiled at its first call, or taken from an earlier run of the same code."""
+    if config.DISABLE_JIT:
+        return function
     dispatcher = numba.njit(**_OPTIONS)(function)
     kept = _KeptCode(function)
     dispatcher._cache = kept  # noqa: SLF001  # as numba's `enable_caching` does
@@ -130,7 +135,7 @@ class _KeptCode(_Cache):  # type: ignore[misc]  # numba has no types
         """Nothing is ever stale."""
 
     def _file_name(self, sig: Any, target_context: Any) -> str | None:  # noqa: ANN401  # numba's
-        name = code_name(self._function)
+        name = code_name(self._function) if _NAMES_ARE_OURS else None
         target = str(target_context.codegen().magic_tuple())
         options = (*_OPTIONS.items(), *_WITHIN_OPTIONS.items(), *_INLINED_OPTIONS.items())
         try:

@@ -171,6 +171,27 @@ def test_no_imports_run_in_a_circle() -> None:
     TopologicalSorter(needs).prepare()  # raises a CycleError that names the circle
 
 
+def test_no_file_uses_two_classes_of_one_name() -> None:
+    homes: dict[str, set[str]] = {}
+    trees = {
+        s: ast.parse(s.read_text(encoding="utf-8"))
+        for package in ("emulator", "planner", "protocol", "tools")
+        for s in (ROOT / package).rglob("*.py")
+    }
+    for source, tree in trees.items():
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef):
+                homes.setdefault(node.name, set()).add(module_name(source))
+    for source, tree in trees.items():
+        met = {(node.name, module_name(source)) for node in tree.body if isinstance(node, ast.ClassDef)}
+        for found in ast.walk(tree):
+            if isinstance(found, ast.ImportFrom):
+                module = str(found.module)
+                met |= {(each.name, module) for each in found.names if module in homes.get(each.name, ())}
+        names = [name for name, _ in met if name != "Serial"]  # pyserial asks each handler of a URL for that name
+        assert len(names) == len(set(names)), (source, sorted(met))
+
+
 @pytest.mark.parametrize("package", ROOMS)
 def test_each_folder_of_a_package_is_a_room_that_says_what_it_is(package: str) -> None:
     assert {source.parent.name for source in (ROOT / package).glob("*/*.py") if package in source.as_posix()} - {

@@ -21,8 +21,10 @@ from protocol.command_line import Parser, program_name
 from protocol.ending import ended
 
 SCAN = "cylinder"
-TIME_SCALE = 3.0
+FAST = 3.0
 """Time scale of the emulator, so that a scan of 47 s is short."""
+_NOT_VERIFIED = (1, 2)
+"""Exit statuses of a run for which this machine may be too slow."""
 LEAD_S = 0.0035
 """Lag of the emulator's encoder behind its reference."""
 
@@ -58,24 +60,33 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def scan_on_a_pty(out: Path) -> int:
-    """Plan, run, verify and show the scan; return the first exit status that is not 0."""
-    from tools.preemption import start_emulator  # noqa: PLC0415  # it loads matplotlib
-
+    """Plan, run, verify and show the scan; return the exit status of the plan, or of the last run."""
     command = ["plan", SCAN, "--out", str(out)]
     _say(f"python -m planner {' '.join(command)}")
     if status := planner(command):
         return status
-    # The path of a socket must be short, but `out` need not be.
-    with tempfile.TemporaryDirectory() as folder:
-        control = str(Path(folder) / "control")
-        with start_emulator("--pty", "--control", control, "--time-scale", f"{TIME_SCALE:g}") as port:
-            command = ["run", str(out / "plan.json"), "--port", port, "--control", control, "--arm-away"]
-            command += ["--time-scale", f"{TIME_SCALE:g}", "--lead", f"{LEAD_S:g}", "--out", str(out / "run")]
-            _say(f"python -m planner {' '.join(command)}")
-            status = planner(command)
+    status = run_on_a_pty(out, FAST)
+    if status in _NOT_VERIFIED:
+        _say(f"not verified at {FAST:g} times real time: this machine is busy; once more, in real time")
+        status = run_on_a_pty(out, 1.0)
     if (page := out / "run" / REPORT_FILE).is_file():
         print(page)
     return status
+
+
+def run_on_a_pty(out: Path, time_scale: float) -> int:
+    """Run the plan in a folder on an emulator of its own, verify it, and return the exit status."""
+    from tools.preemption import start_emulator  # noqa: PLC0415  # it loads matplotlib
+
+    scale = ["--time-scale", f"{time_scale:g}"]
+    # The path of a socket must be short, but `out` need not be.
+    with tempfile.TemporaryDirectory() as folder:
+        control = str(Path(folder) / "control")
+        with start_emulator("--pty", "--control", control, *scale) as port:
+            command = ["run", str(out / "plan.json"), "--port", port, "--control", control, "--arm-away"]
+            command += [*scale, "--lead", f"{LEAD_S:g}", "--out", str(out / "run")]
+            _say(f"python -m planner {' '.join(command)}")
+            return planner(command)
 
 
 def _say(sentence: str) -> None:

@@ -48,10 +48,13 @@ def _draw(options: argparse.Namespace) -> int:
     from planner.plot_style import save_picture  # noqa: PLC0415  # see `NAMES`
     from tools.paper_figures import FIGURES  # noqa: PLC0415
 
-    options.out.mkdir(parents=True, exist_ok=True)
     for name in options.names or NAMES:
-        path = options.out / f"{name}.png"
-        save_picture(FIGURES[name](), path)
+        figure, path = FIGURES[name](), options.out / f"{name}.png"
+        try:
+            options.out.mkdir(parents=True, exist_ok=True)
+            save_picture(figure, path)
+        except OSError as error:
+            raise OSError(f"{options.out}: the figures cannot be written there ({error.strerror or error})") from error
         print(path)
     return 0
 

@@ -24,8 +24,6 @@ class _Shown(ctypes.Structure):
     _fields_ = (
         ("duty", ctypes.c_int32),
         ("longest_tick", ctypes.c_uint32),
-        ("tick_cycles", ctypes.c_uint64),
-        ("ticks", ctypes.c_uint32),
         ("lost_edges", ctypes.c_uint32),
         ("duty_changes", ctypes.c_uint32),
         ("overrun_bytes", ctypes.c_uint32),
@@ -111,11 +109,6 @@ class Chip:
     def longest_tick(self) -> int:
         """The cycles of the longest tick, interrupts included."""
         return int(self._shown.longest_tick)
-
-    @property
-    def mean_tick(self) -> float:
-        """The cycles of the mean tick, interrupts included."""
-        return float(self._shown.tick_cycles) / max(1, int(self._shown.ticks))
 
     @property
     def lost_edges(self) -> int:

@@ -109,11 +109,16 @@ def _compile(built: Path, command: list[str]) -> None:
         raise ToolchainError(f"{built}: {error.strerror}; set XDG_CACHE_HOME to a folder with room") from error
 
 
-@cache
 def _version(compiler: str) -> str:
+    path = which(compiler)
+    if path is None:
+        raise ToolchainError(f"{compiler} is not installed; {_INSTALL}")
+    return _version_of(path)
+
+
+@cache
+def _version_of(path: str) -> str:
     try:
-        return subprocess.run(  # noqa: S603  # one of two names
-            [compiler, "--version"], check=True, capture_output=True, text=True
-        ).stdout
+        return subprocess.run([path, "--version"], check=True, capture_output=True, text=True).stdout  # noqa: S603  # a compiler
     except (OSError, subprocess.CalledProcessError) as error:
-        raise ToolchainError(f"{compiler} is not installed; {_INSTALL}") from error
+        raise ToolchainError(f"{path} does not run: {error}; {_INSTALL}") from error

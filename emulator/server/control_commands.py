@@ -115,7 +115,7 @@ def _parse(request: bytes) -> tuple[Command, dict[str, float]]:
     if not isinstance(fields, dict) or not isinstance(name := fields.pop("command", None), str):
         raise RequestError('a request is a JSON object that names its command, such as {"command": "state"}')
     if name not in COMMANDS:
-        raise RequestError(f"{shown(name)} is not a command; there are {', '.join(COMMANDS)}")
+        raise RequestError(f"{shown(name)} is not a command; allowed are {', '.join(COMMANDS)}")
     command = COMMANDS[name]
     required = {parameter.name for parameter in command.parameters if not parameter.optional}
     if not required <= fields.keys() <= {parameter.name for parameter in command.parameters}:

@@ -72,6 +72,7 @@ class Server:
         self._arrivals: deque[Arrival] = deque()
         self._leaving = False
         self._hung_up = False
+        self._incomplete_reply = b""
 
     def run(self) -> None:
         """Serve until a signal or the control channel ends it."""
@@ -209,9 +210,15 @@ class Server:
     def _send_replies(self) -> None:
         data = self.table.transmit()
         if data and not self._leaving:
-            _log.debug("sent %r", data)
+            self._log_reply(data)
             for port in self._ports:
                 port.send(data)
+
+    def _log_reply(self, data: bytes) -> None:
+        """Log whole lines: at a finite baud rate the replies come in pieces."""
+        lines, end, self._incomplete_reply = (self._incomplete_reply + data).rpartition(b"\r")
+        if end:
+            _log.debug("sent %r", lines + end)
 
     def _serve_signals(self) -> None:
         for number in self._signals.received():

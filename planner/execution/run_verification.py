@@ -87,7 +87,11 @@ class RunVerification(NamedTuple):
             return f"deviated: a forbidden cell was touched in {count} steps, the first is {first}"
         if not self.worst_deg <= self.tolerance_deg:
             return f"deviated: {self.worst_deg:.3f} deg at a location; allowed: {self.tolerance_deg:g}"
-        return f"verified: within {self.worst_deg:.3f} deg of the plan at every location"
+        worst = f"verified: within {self.worst_deg:.3f} deg of the plan at every location"
+        true = self.deviations.get("true")
+        if true is None or true.at_locations_deg <= self.worst_deg:
+            return worst
+        return f"{worst} by the encoder, within {true.at_locations_deg:.3f} deg in truth"
 
 
 def verify_run(

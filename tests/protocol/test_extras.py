@@ -59,11 +59,11 @@ def run(words: list[str], environment: dict[str, str], folder: Path) -> subproce
     ("words", "program", "extra"),
     [
         (["planner", "map", "mould", "--out", "out"], "planner", "planner"),
-        (["tools.tune", "--out", "out"], "tools.tune", "tools"),
-        (["tools.identify", "fit", "trace.csv", "--out", "table.toml"], "tools.identify", "planner"),
-        (["tools.plot_trace", "run.csv", "--out", "run.png"], "tools.plot_trace", "planner"),
-        (["seventh-axis", "plan", "cylinder", "--out", "out"], "seventh-axis", "planner"),
-        (["seventh-axis", "tune", "--out", "out"], "seventh-axis", "tools"),
+        (["tools.tune", "--out", "out"], "tune", "tools"),
+        (["tools.identify", "fit", "trace.csv", "--out", "table.toml"], "identify", "planner"),
+        (["tools.plot_trace", "run.csv", "--out", "run.png"], "plot_trace", "planner"),
+        (["seventh-axis", "plan", "cylinder", "--out", "out"], "seventh-axis plan", "planner"),
+        (["seventh-axis", "tune", "--out", "out"], "seventh-axis tune", "tools"),
     ],
     ids=lambda value: "-".join(value[:2]) if isinstance(value, list) else None,
 )

@@ -160,6 +160,13 @@ def test_code_is_compiled_for_the_settings_of_numba(checkout: Checkout, monkeypa
     assert checkout.run() == (13.0, 0)
 
 
+def test_kernels_run_interpreted_where_numba_is_told_not_to_compile(
+    checkout: Checkout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert checkout.run() == (13.0, 0)
+
+
 def test_without_a_folder_that_can_be_written_code_is_compiled_each_time(checkout: Checkout) -> None:
     checkout.cache.write_text("a file in the place of the folder")
     assert checkout.run() == (13.0, 2)

@@ -24,13 +24,13 @@ static volatile bool is_tick_over;
 ISR(TIMER2_COMPA_vect)
 {
     static bool is_running;
-    board_drive(controller.pid.duty); /* that of the last tick, so that it changes at the same instant of each tick */
-    const int32_t count = encoder_sample();
-    line_release();
-    if (is_running) {
+    if (is_running) { /* the controller is amid its step: nothing of it may be read */
         ++overruns;
         return;
     }
+    board_drive(controller.pid.duty); /* that of the last tick, so that it changes at the same instant of each tick */
+    const int32_t count = encoder_sample();
+    line_release();
     is_running = true;
     sei();
     controller_step(count);

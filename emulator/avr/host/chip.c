@@ -45,8 +45,6 @@ struct event {
 struct chip {
     int32_t duty;            /* on the bridge, below 0 backwards */
     uint32_t longest_tick;   /* cycles from the entry of the tick's interrupt to its end */
-    uint64_t tick_cycles;    /* of all ticks together */
-    uint32_t ticks;
     uint32_t lost_edges;     /* interrupts that came while the last one of the same channel still waited */
     uint32_t duty_changes;   /* ticks amid which the duty became another */
     uint32_t overrun_bytes;  /* that came while two others waited in the hardware */
@@ -108,8 +106,6 @@ static void tick_changed(avr_irq_t *irq, uint32_t is_running, void *param)
     } else {
         const uint32_t cycles = (uint32_t)(chip->avr->cycle - chip->tick_entry);
         chip->longest_tick = cycles > chip->longest_tick ? cycles : chip->longest_tick;
-        chip->tick_cycles += cycles;
-        ++chip->ticks;
     }
 }
 

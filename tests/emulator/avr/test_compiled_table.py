@@ -1,17 +1,18 @@
 """The compiled firmware behind the surface of a table."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from emulator.avr.compiled_table import CompiledTable
+from emulator.avr.compiled_table import AnyTable, CompiledTable
 from emulator.avr.errors import ToolchainError
 from emulator.avr.toolchain import build_firmware
 from emulator.config.table_config import load_config
 from emulator.faults.fault import FaultError, fault_from
 from emulator.table.table import Table
-from protocol.bench import SimulatedBench
+from protocol.bench import SimulatedBench, TableStatus
 from tests.emulator.avr.toolchain_mark import needs_toolchain
 
 pytestmark = needs_toolchain
@@ -24,6 +25,10 @@ def moved(table: Table | CompiledTable) -> bytes:
     table.receive(b"H\rL\r")
     table.advance(100)
     return table.transmit()
+
+
+def observe(statuses: list[TableStatus], status: TableStatus, _read: bytes, _left: bytes) -> None:
+    statuses.append(status)
 
 
 def test_it_is_a_bench_in_simulated_time() -> None:
@@ -44,15 +49,15 @@ def test_the_same_inputs_give_the_same_outputs() -> None:
 
 
 def test_an_observer_sees_every_tick_as_on_the_emulator() -> None:
-    seen: list[list[tuple[float, str]]] = []
-    for table in (Table(load_config()), CompiledTable(load_config())):
-        ticks: list[tuple[float, str]] = []
-        table.observer = lambda status, _read, _left, ticks=ticks: ticks.append((status.duty, status.state))  # type: ignore[misc]  # a default argument
+    seen: list[list[TableStatus]] = [[], []]
+    tables: tuple[AnyTable, ...] = (Table(load_config()), CompiledTable(load_config()))
+    for table, statuses in zip(tables, seen, strict=True):
+        table.observer = partial(observe, statuses)
         table.receive(b"R 1\r")
         table.advance(400)
-        seen.append(ticks)
-    assert seen[0] == seen[1]
-    assert len(seen[0]) == 400
+    ours, theirs = ([(one.tick, one.duty, one.state, one.reference_deg) for one in statuses] for statuses in seen)
+    assert ours == theirs
+    assert len(ours) == 400
 
 
 def test_a_power_cycle_leaves_the_plant_where_it_is_and_the_counter_at_0() -> None:

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from planner.map.config_map import ConfigurationMap
 from planner.plans.problem import Problem
-from planner.search.reference_motion import reference_motion
+from planner.search.reference_motion import ACCELERATION_SHARE, reference_motion
 from planner.table.motion import Limits, roll_out
 
 
@@ -33,6 +33,15 @@ def test_it_starts_as_asked_and_rests_on_a_sample_within_the_limits(
     angles, speeds = roll_out(motion.angles_deg[0], motion.speeds_deg_s[0], motion.accelerations_deg_s2, step_s)
     assert motion.angles_deg == pytest.approx(angles, abs=1e-9)
     assert motion.speeds_deg_s == pytest.approx(speeds, abs=1e-9)
+
+
+@pytest.mark.parametrize(("share", "steps"), [(0.01, 2), (-0.99, 2), (1.99, 2), (2.01, 3), (-6.99, 7)])
+def test_a_start_comes_to_rest_in_the_smallest_number_of_steps(share: float, steps: int) -> None:
+    limits, step_s = Limits(100.0, 50.0), 0.1
+    speed = share * ACCELERATION_SHARE * limits.acceleration_deg_s2 * step_s  # as a multiple of what a step can change
+    problem = Problem(ConfigurationMap(np.ones((20, 36))), step_s, limits, start_speed_deg_s=speed)
+    motion = reference_motion(problem)
+    assert np.flatnonzero(motion.speeds_deg_s).tolist() == list(range(steps))
 
 
 def test_a_start_at_rest_on_a_sample_stays_there() -> None:

@@ -30,7 +30,8 @@ def test_the_report_says_how_far_each_answer_is_from_the_model(tuning: Tuning) -
         for former, figure in zip(before.figures, after.figures, strict=True):
             *_, change, model, difference = cells(html, f"{figure.title} ({figure.unit})")
             if former.emulator > 0.0:
-                assert change == f"{100.0 * (figure.emulator / former.emulator - 1.0):+.0f} %"
+                percent = 100.0 * (figure.emulator / former.emulator - 1.0)
+                assert change == (f"{percent:+.0f} %" if abs(percent) > 0.5 else "0 %")
             if figure.model is None:
                 assert model == difference == ""
             else:

@@ -1,6 +1,7 @@
 """A session with tables of every kind: right, strict, slow, absent, wrong."""
 
 import dataclasses
+import importlib
 from collections.abc import Sequence
 from pathlib import Path
 from random import Random
@@ -229,7 +230,7 @@ def rig_on(port: Serial, seed: int) -> Rig:
     return Rig(Wire(RecordedPort(port)), profile, InProcess(port.table), 0, Random(seed))  # noqa: S311 - no secret
 
 
-@pytest.mark.parametrize("wrong", ["-0.0", "CAN is passed over, and the half line carried out"])
+@pytest.mark.parametrize("wrong", ["-0.0", "CAN is ignored, and the incomplete line is executed"])
 def test_a_random_walk_finds_what_is_wrong_and_shrinks_it(wrong: str) -> None:
     found = first_failure([rig_on(port_to(MUTANTS[wrong][1]), seed) for seed in range(6)])
     steps = found.partition("; after ")[2].split(", ")
@@ -248,6 +249,23 @@ def test_on_a_real_table_a_failing_walk_is_not_repeated_but_shrunk_on_the_emulat
     for rig in rigs:
         rig.wire.port.inner = UnclockedPort(rig.wire.port.inner)
     assert first_failure(rigs).endswith("the emulator passes the same walk")
+
+
+def test_a_seed_gives_the_same_walk_whatever_else_is_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """hypothesis also draws the constants of the modules that it finds, here those of a user's own."""
+    alone = traffic_of_walk(seed=5)
+    (tmp_path / "module_of_a_user.py").write_text(f"NUMBERS = {[*range(100, 900)]}\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    importlib.import_module("module_of_a_user")
+    assert traffic_of_walk(seed=5) == alone
+    assert traffic_of_walk(seed=6) != alone
+
+
+def traffic_of_walk(seed: int) -> list[str]:
+    rig = rig_on(Serial("emulator://"), seed)
+    walk(rig)
+    assert isinstance(rig.wire.port, RecordedPort)
+    return [str(event) for event in rig.wire.port.events]
 
 
 def first_failure(rigs: Sequence[Rig]) -> str:
