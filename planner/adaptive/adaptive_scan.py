@@ -51,7 +51,7 @@ class AdaptOptions(NamedTuple):
     """What a session is for.
 
     Attributes:
-        share: Of what can be seen, that is wanted; 0 without the mesh, where nobody knows it, to scan what is found.
+        share: Of what can be seen, that is wanted; 0 to scan what is found, where the mesh is not known.
         most_strips: How many strips are scanned at most.
         bounds: A cylinder that holds the part, in frame W: the strips are chosen without the mesh. None to use it.
     """

@@ -1,10 +1,10 @@
-"""Join two clouds of one part that overlap: find the pose of the second in the frame of the first, or say why not.
+"""Join two clouds of one part that overlap: find the pose of the second in the frame of the first, or why not.
 
 Generalized ICP (Segal, Haehnel and Thrun, 2009) by small_gicp, from many first guesses, so that a second pose that
 fits as well is found. Two things decide: the overlap, points of the second cloud that have a point of the first one
 near, with the same normal; and contradictions, points of one cloud in space that the laser passed for the other one.
-The pose is refused where the overlap leaves a motion free (a cylinder about its own axis), where another pose fits as
-well (a symmetric part), and where the overlap is too small.
+The pose is refused where the overlap is too small, and where it leaves a motion free (a cylinder about its own axis).
+It is refused, too, where another pose fits as well (a symmetric part).
 """
 
 from typing import NamedTuple
@@ -150,7 +150,7 @@ def _rivalry(judged: list[tuple[Overlap, FloatArray]], second: Cloud, size_mm: f
 
 
 class _Pair:
-    """Two clouds, prepared to be aligned again and again."""
+    """Two clouds, prepared to be aligned repeatedly."""
 
     def __init__(self, first: Cloud, second: Cloud) -> None:
         import small_gicp  # noqa: PLC0415  # an extra: only who joins clouds needs it
@@ -250,7 +250,7 @@ def _apart(T: FloatArray, other: FloatArray, cloud: Cloud) -> tuple[float, float
 
 
 def _weakest(found: Overlap, size_mm: float) -> float:
-    """Return the root mean square motion across the surface, for the rigid motion of 1 mm that has the least.
+    """Return the RMS motion across the surface, of the rigid motion of 1 mm that the surface resists least.
 
     A rotation counts by how far it moves a place at half the part's size.
     """

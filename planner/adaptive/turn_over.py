@@ -26,7 +26,7 @@ from planner.geometry.transforms import rigid_inverse
 from planner.scanning.error_budget import signed_distances_mm
 from planner.scanning.point_cloud import PlyWriter, read_cloud
 from planner.scanning.probe import Sight
-from planner.scanning.scan_run import CLOUD_FILE, ScanOptions
+from planner.scanning.scan_run import CLOUD_FILE, ScanOptions, write_surface
 from protocol.progress import ProgressOf
 
 TURNED_FOLDER, JOINED_FILE = "turned", "joined.ply"
@@ -93,9 +93,11 @@ def scan_turned_over(
     T_21 = other_face(scan.mesh, unseen)
     turned, laid = _moved(scan, T_21), _moved(scan, _by_hand(options.seed) @ T_21)
     check_it_fits_the_table(turned.mesh, scan.cell)
-    second = scan_adaptively(laid, options, adapt, out / TURNED_FOLDER, progress, say, turned)
+    alone = options._replace(normals=False, surface=None)
+    second = scan_adaptively(laid, alone, adapt, out / TURNED_FOLDER, progress, say, turned)
     clouds = read_cloud(out / CLOUD_FILE), read_cloud(out / TURNED_FOLDER / CLOUD_FILE)
-    joined = join(_thinned(*clouds[0]), _thinned(*clouds[1]), rigid_inverse(T_21))
+    one, other = (Cloud.of(_thinned(_CELL_MM, cloud)) for cloud in clouds)
+    joined = join(one, other, rigid_inverse(T_21))
     first_mm, second_mm = (
         _mean_mm(mesh_of.mesh, points) for mesh_of, (points, _) in zip((scan, laid), clouds, strict=True)
     )
@@ -103,6 +105,8 @@ def scan_turned_over(
     if isinstance(joined, Joined):
         moved = clouds[1][0] @ joined.T_12[:3, :3].T + joined.T_12[:3, 3], clouds[1][1] @ joined.T_12[:3, :3].T
         _write(out / JOINED_FILE, scan.name, clouds[0], moved)
+        if options.thinned_mm is not None:
+            write_surface(_thinned(options.thinned_mm, clouds[0], moved), scan.name, options, out)
         shares = np.array((len(clouds[0][0]), len(moved[0])), dtype=np.float64)
         joined_mm = float(shares @ (first_mm, _mean_mm(scan.mesh, moved[0])) / shares.sum())
     seen, visible = _in_either(first, second, rigid_inverse(T_21))
@@ -110,7 +114,7 @@ def scan_turned_over(
 
 
 def turned_over_document(turned: TurnedOver) -> dict[str, Any]:
-    """Return what `scan.json` tells of the second placement."""
+    """Return the second placement for `scan.json`."""
     document: dict[str, Any] = {
         "seen_of_whole": float(turned.seen.mean()),
         "seen_of_visible": float(turned.seen.sum() / max(1, turned.visible.sum())),
@@ -157,10 +161,12 @@ def _by_hand(seed: int) -> FloatArray:
     return placement(_LAID_MM * x, _LAID_MM * y, 0.0, _LAID_DEG * turn, 0.0, 0.0)
 
 
-def _thinned(points: FloatArray, beams: FloatArray) -> Cloud:
-    thinned = ThinnedCloud(_CELL_MM)
-    thinned.take(points, beams)
-    return Cloud.of(thinned)
+def _thinned(cell_mm: float, *clouds: tuple[FloatArray, FloatArray]) -> ThinnedCloud:
+    """Return clouds of points and beams as one thinned cloud."""
+    thinned = ThinnedCloud(cell_mm)
+    for points, beams in clouds:
+        thinned.take(points, beams)
+    return thinned
 
 
 def _mean_mm(mesh: trimesh.Trimesh, points: FloatArray) -> float:

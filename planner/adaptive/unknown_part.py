@@ -1,6 +1,6 @@
 """The policy without a mesh: look beyond the edges of what was seen, past space that counts as solid until seen.
 
-All that it knows is the cell, the probe, a bounding cylinder, and what the probe returned. It sees no mesh: none of its
+It is given the cell, the probe, a bounding cylinder, and what the probe returned. It sees no mesh: none of its
 arguments has one.
 """
 
@@ -167,7 +167,7 @@ class UnknownPart:
         return np.concatenate((straight, moved[much]))
 
     def _chosen(self, candidates: FloatArray, weights: FloatArray) -> list[Strip]:
-        """Return up to a batch of strips that the arm can sweep, each worth the most beside those before it."""
+        """Return up to a batch of strips that the arm can sweep, the next always worth more than any other."""
         n, k = candidates.shape[:2]
         poses = allowed(self._surroundings, self.solid(), candidates.reshape(-1, 4, 4))
         turn = int(self._surroundings.limits.speed_deg_s * self._step_s / (360.0 / ANGLES))

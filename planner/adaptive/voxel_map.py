@@ -1,7 +1,7 @@
 """What is known of the space around a part that nobody has a mesh of: a voxel is unknown, free, or holds surface.
 
 Space is free where a laser ray passed on its way to a point that was measured; a ray without a measurement proves
-nothing. Of the two cameras the probe does not say which one saw a spot, so their rays prove nothing either. Everything
+nothing. The probe does not report which of its cameras saw a spot, so their rays prove nothing either. Everything
 else inside the bounding cylinder counts as solid. Outside of it is free: that is what its user vouches for.
 """
 

@@ -131,7 +131,7 @@ def _show_strips(number: int, state: str) -> None:
 
 
 def _share_wanted(arguments: argparse.Namespace) -> float:
-    """Return the share of what can be seen that is wanted; without the mesh nobody knows it while scanning."""
+    """Return the share of what can be seen that is wanted; without the mesh it is not known while scanning."""
     if arguments.adapt is not None:
         return float(arguments.adapt)
     return 0.0 if arguments.blind is not None else SHARE_SEEN

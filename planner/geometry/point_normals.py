@@ -12,7 +12,7 @@ _BLOCK = 20_000
 _FEWEST = 6
 """Points that a plane takes, in both directions of it more than noise."""
 _LINE = 0.02
-"""Ratio of the middle to the greatest variance below which neighbors lie on a line, which has no normal."""
+"""Ratio of the middle to the maximum variance below which neighbors lie on a line, which has no normal."""
 
 
 class PointNormals(NamedTuple):

@@ -1,7 +1,7 @@
 """The latched pose of every profile as a table for other programs: CSV, one row a profile.
 
-Frames: B is the robot's base, F its flange, S the probe (origin at the laser's exit, +Z along the beam, +X along the
-laser line), W the workpiece, which turns with the table. A pose is a position in mm and a unit quaternion with its
+Frames: B is the robot's base, F its flange. S is the probe: origin at the laser's exit, +Z along the beam, +X along the
+laser line. W is the workpiece, which turns with the table. A pose is a position in mm and a unit quaternion with its
 scalar last, as scipy and ROS have it.
 """
 

@@ -300,14 +300,14 @@ def finished(
     T_BF = chain.flange_poses(run.joints_deg)
     write_poses(out / POSES_FILE, run.numbers, run.times_s, run.angles_deg, run.joints_deg, T_BF, known_poses(chain))
     if work.thinned is not None:
-        _write_surface(work.thinned, scan.name, options, out)
+        write_surface(work.thinned, scan.name, options, out)
     budget = error_budget_of(chain, work.samples.all(), scan.mesh, 10.0**-options.decimals)
     return Scanned(
         scan, options, probe, planned, knowledge, run, points, work.coverage, budget, dead_line, not is_whole
     )
 
 
-def _write_surface(cloud: ThinnedCloud, name: str, options: ScanOptions, out: Path) -> None:
+def write_surface(cloud: ThinnedCloud, name: str, options: ScanOptions, out: Path) -> None:
     """Write the thinned cloud with its normals, and the surface through it, as far as they were asked for."""
     points = cloud.points
     found = point_normals(points, cloud.beams, _NORMAL_MM)
