@@ -58,7 +58,6 @@ def adaptive_report(scanned: AdaptiveScanned, origin: Origin | None = None) -> s
         table(
             ("strip", "of what can be seen", "of the whole", "table (deg)", "way (s)", "motion (s)", "off its plan"),
             list(_strips(scanned)),
-            words=True,
         ),
         paragraph(
             "On the way to a strip, the probe retracts along its beam, the arm moves, and the probe approaches."

@@ -12,6 +12,7 @@ from typing import NamedTuple, TextIO
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.adaptive.adaptive_scan import AdaptiveScanned, AdaptOptions, scan_adaptively
+from planner.adaptive.choice import choose
 from planner.adaptive.known_part import KnownPart
 from planner.adaptive.surroundings import Surroundings
 from planner.cell.obstacles import workpiece_obstacle
@@ -87,7 +88,8 @@ def _choice(scan: Scan) -> _Choice:
     policy = KnownPart(surroundings, scan.mesh, solid, probe, _SHARE, 1000, 20.0)
     strips = policy.next_strips()
     cpu_s = time.process_time() - start_s
-    best = fewest_strips(policy.sees, policy.wanted)
+    chosen = choose(policy.sees, policy.seen, policy.wanted, 1000)
+    best = fewest_strips(policy.sees, policy.wanted, chosen)
     fewest = str(best.strips) if best.strips == best.at_least else f"{best.at_least} to {best.strips}"
     return _Choice(len(strips), fewest, cpu_s)
 
