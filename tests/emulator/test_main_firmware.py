@@ -30,7 +30,8 @@ def test_the_compiled_firmware_is_a_table_on_a_pty_with_trace_trigger_and_contro
         wait_until(lambda: ask(port, b"L") == b"L 2.0\r")
     assert control_client.main([str(control), "fault-stall"]) != 0
     assert "stall has no effect on the compiled firmware" in capsys.readouterr().err
-    assert table.stop() == 0
+    table.process.send_signal(signal.SIGTERM)
+    assert table.process.wait(20) == 0
     recorded = read_trace(trace)
     assert recorded.encoder_deg[-1] == pytest.approx(2, abs=0.05)
     assert b"".join(recorded.received).startswith(b"P 2\r")
