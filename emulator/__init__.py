@@ -3,7 +3,7 @@
 Importing it registers the port `emulator://` with pyserial: a private table in virtual time.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the slow imports
+import protocol.program.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import serial

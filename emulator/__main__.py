@@ -18,8 +18,8 @@ from emulator.server.server import SERVED_SIGNALS, Server
 from emulator.server.signals import SignalWatch
 from emulator.table.table import Table
 from emulator.trace import TraceError, TraceWriter
-from protocol.command_line import Parser, program_name, report, report_error
-from protocol.data_file import shown
+from protocol.files.data_file import shown
+from protocol.program.command_line import Parser, program_name, report, report_error
 
 _EXAMPLE = """example:
   {table} --pty --link ./table &

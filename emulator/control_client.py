@@ -7,9 +7,9 @@ from pathlib import Path
 
 from emulator.server.control_commands import COMMANDS
 from protocol.bench import BenchError
-from protocol.command_line import Parser, program_name
 from protocol.control_channel import request
-from protocol.ending import ended
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
 
 __all__ = ["main", "request"]
 

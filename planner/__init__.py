@@ -7,7 +7,7 @@
 Each name is loaded at its first use, so that `import planner` is fast.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the slow imports
+import protocol.program.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 from importlib import import_module

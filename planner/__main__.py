@@ -8,8 +8,8 @@ from importlib import import_module
 from planner.commands.command_line import parser
 from planner.errors import PlannerError
 from planner.kinematics.configuration import Configuration
-from protocol.command_line import program_name
-from protocol.ending import ended
+from protocol.program.command_line import program_name
+from protocol.program.ending import ended
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -22,7 +22,7 @@ class _Kernel:
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401  # numba's dispatcher
         if name != "_compiled":
             raise AttributeError(name)
-        from protocol.machine_code import compiled  # noqa: PLC0415  # see above
+        from protocol.kernels.machine_code import compiled  # noqa: PLC0415  # see above
 
         self._compiled = compiled(self.py_func)
         return self._compiled
@@ -32,7 +32,7 @@ class _Kernel:
 
     @property
     def _numba_type_(self) -> Any:  # noqa: ANN401  # numba's type, of which it asks a global of a compiled function
-        from protocol.machine_code import within_type  # noqa: PLC0415  # see above
+        from protocol.kernels.machine_code import within_type  # noqa: PLC0415  # see above
 
         if self._within is None:
             self._within = within_type(self.py_func)

@@ -13,7 +13,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from protocol.whole_file import whole_file
+from protocol.files.whole_file import whole_file
 
 BLUE, VERMILION, GREEN, AMBER, SKY = "#0072b2", "#d55e00", "#009e73", "#e69f00", "#56b4e9"
 INK, GRAY, PALE = "#23272d", "#7a7f87", "#c9ced4"

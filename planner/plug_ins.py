@@ -13,7 +13,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from planner.errors import PlannerError
-from protocol.data_file import did_you_mean
+from protocol.files.data_file import did_you_mean
 
 PLANNER_GROUP = "seventh_axis.planners"
 FACTOR_GROUP = "seventh_axis.factors"

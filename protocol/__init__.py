@@ -1,6 +1,6 @@
 """The serial protocol between a client and the rotary table."""
 
-import protocol.quiet_start  # noqa: F401 - first, see there
+import protocol.program.quiet_start  # noqa: F401 - first, see there
 
 # isort: split
 

@@ -17,9 +17,9 @@ from decimal import ROUND_DOWN, Decimal
 
 from protocol.dialogue import Dialogue
 from protocol.errors import ArrivalTimeout, NotStopped, ReplyTimeout, TableError, UnexpectedReply
-from protocol.interrupts import signals_wait
 from protocol.messages import Angle, Command, Verb
 from protocol.predicted_reference import PredictedReference
+from protocol.program.interrupts import signals_wait
 from protocol.standstill import Standstill
 from protocol.trapezoid import braking_way_deg
 

@@ -78,18 +78,18 @@ EDGE_MODULES = {
 
 PROTOCOL_EDGE = {
     "protocol/clock.py": {"time"},
-    "protocol/color.py": {"os"},
-    "protocol/command_line.py": {"os", "pathlib"},
+    "protocol/program/color.py": {"os"},
+    "protocol/program/command_line.py": {"os", "pathlib"},
     "protocol/control_channel.py": {"pathlib", "socket"},
-    "protocol/interrupts.py": {"signal", "threading"},
-    "protocol/ending.py": {"os"},
-    "protocol/kept_code.py": {"pathlib"},
-    "protocol/kept_file.py": {"fcntl", "os", "pathlib", "time"},
-    "protocol/progress.py": {"os"},
-    "protocol/quiet_start.py": {"os", "signal"},
+    "protocol/program/interrupts.py": {"signal", "threading"},
+    "protocol/program/ending.py": {"os"},
+    "protocol/kernels/kept_code.py": {"pathlib"},
+    "protocol/kernels/kept_file.py": {"fcntl", "os", "pathlib", "time"},
+    "protocol/program/progress.py": {"os"},
+    "protocol/program/quiet_start.py": {"os", "signal"},
     "protocol/conformance/__main__.py": {"pathlib"},
-    "protocol/data_file.py": {"pathlib"},
-    "protocol/toml_table.py": {"pathlib"},
+    "protocol/files/data_file.py": {"pathlib"},
+    "protocol/files/toml_table.py": {"pathlib"},
     "protocol/conformance/pytest/fixture.py": {"pathlib", "subprocess"},
     "protocol/conformance/bench/host_watch.py": {"os", "select", "threading", "time"},
     "protocol/conformance/bench/ports.py": {"pathlib", "serial"},
@@ -100,9 +100,9 @@ PROTOCOL_EDGE = {
     "protocol/conformance/results/report.py": {"pathlib"},
     "protocol/conformance/bench/stand.py": {"pathlib"},
     "protocol/conformance/commands/suite_run.py": {"datetime", "os", "pathlib"},
-    "protocol/own_program.py": {"os", "pathlib"},
+    "protocol/program/own_program.py": {"os", "pathlib"},
     "protocol/serial_port.py": {"serial"},
-    "protocol/whole_file.py": {"os", "pathlib"},
+    "protocol/files/whole_file.py": {"os", "pathlib"},
 }
 
 EMULATOR_EDGE = {
@@ -214,6 +214,18 @@ def test_the_files_beside_the_rooms_need_none_of_them(package: str) -> None:
     name = package.replace("/", ".")
     sources = [source for source in (ROOT / package).glob("*.py") if source.stem not in ABOVE_THE_ROOMS[package]]
     assert imports_from([f"{name}.{room}" for room in ROOMS[package]], sources) == []
+
+
+SERVICES = ("files", "program", "kernels")
+"""The folders of `protocol` that every package needs; each may import from itself and those before it."""
+
+
+@pytest.mark.parametrize("room", SERVICES)
+def test_what_every_package_needs_knows_nothing_of_the_wire(room: str) -> None:
+    known = tuple(f"protocol.{name}." for name in SERVICES[: SERVICES.index(room) + 1])
+    sources = list((ROOT / "protocol" / room).glob("*.py"))
+    assert [found for found in imports_from(["protocol"], sources) if not f"{found[1]}.".startswith(known)] == []
+    assert ast.get_docstring(ast.parse((ROOT / "protocol" / room / "__init__.py").read_text(encoding="utf-8")))
 
 
 CORE = ("plant", "firmware", "line")

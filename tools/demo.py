@@ -5,7 +5,7 @@ Then it verifies from the readings that the motion was as planned, and prints th
 tools.demo preemption --out DIR` draws Fig. 4 of the paper instead.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the slow imports
+import protocol.program.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -17,8 +17,8 @@ from pathlib import Path
 from planner.__main__ import main as planner
 from planner.defaults import REPORT_FILE
 from protocol import TableError
-from protocol.command_line import Parser, program_name
-from protocol.ending import ended
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
 
 SCAN = "cylinder"
 FAST = 3.0

@@ -4,7 +4,7 @@ Fig. 5 is the shape of Eq. (1), Fig. 6 a configuration map with a plan in both v
 Dijkstra's algorithm. Fig. 8 is ray shooting at four times, and Fig. 9 its speed and acceleration.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the slow imports
+import protocol.program.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -12,9 +12,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from protocol.command_line import Parser, program_name
-from protocol.data_file import did_you_mean
-from protocol.ending import ended
+from protocol.files.data_file import did_you_mean
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
 
 NAMES = ("fig5", "fig6", "fig7", "fig8", "fig9")
 """Of `paper_figures.FIGURES`, which loads the planner and what draws."""

@@ -14,9 +14,9 @@ from emulator.avr.errors import ChipError, ToolchainError
 from emulator.avr.header import CLOCK_HZ
 from emulator.avr.toolchain import build_firmware
 from emulator.config.table_config import ConfigError, TableConfig, load_config
-from protocol.command_line import Parser, program_name
-from protocol.ending import ended
-from protocol.whole_file import whole_file
+from protocol.files.whole_file import whole_file
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
 from tools.lockstep import PartingError, run_edges
 
 FLASH_BYTES = 32 * 1024

@@ -8,9 +8,9 @@ from pathlib import Path
 from emulator.avr.header import header_text
 from emulator.avr.toolchain import CONSTANTS
 from emulator.config.table_config import ConfigError, load_config
-from protocol.command_line import Parser, program_name
-from protocol.ending import ended
-from protocol.whole_file import write_whole
+from protocol.files.whole_file import write_whole
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

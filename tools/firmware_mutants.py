@@ -15,14 +15,14 @@ from typing import NamedTuple
 from emulator.avr.errors import ChipError, ToolchainError
 from emulator.avr.toolchain import FIRMWARE, build_firmware, lacking
 from emulator.config.table_config import load_config
-from protocol.command_line import Parser, program_name
 from protocol.conformance.bench.stand import InProcess
 from protocol.conformance.bench.wire import RecordedPort
 from protocol.conformance.cases.catalog import chosen_cases
 from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import Profile, load_profile
 from protocol.conformance.session.suite import Session, SessionError
-from protocol.ending import ended
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
 from tools.lockstep import PartingError, run_edges, run_lockstep, run_phases
 
 MUTANTS = Path(__file__).with_name("firmware_mutants.toml")

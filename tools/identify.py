@@ -1,6 +1,6 @@
 """Identify a table: record a suitable motion over a port, and estimate the constants from a recording."""
 
-import protocol.quiet_start  # noqa: F401 - before the slow imports
+import protocol.program.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -9,9 +9,9 @@ from importlib import import_module
 from pathlib import Path
 
 from emulator.config.table_config import ConfigError
-from protocol.command_line import Parser, program_name
-from protocol.ending import ended
 from protocol.errors import TableError
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
 from tools.identification.errors import RecordingError
 
 _EXAMPLES = """examples:

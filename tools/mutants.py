@@ -5,7 +5,7 @@ at a time, in memory. It runs the suite against that table until a case fails. I
 may pass are listed with the reason in `mutants.toml`.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the slow imports
+import protocol.program.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -20,10 +20,10 @@ from random import Random
 from typing import NamedTuple
 
 from emulator.table.fast_ticks import LOADED_TICKS
-from protocol.command_line import Parser, program_name
-from protocol.ending import ended
-from protocol.own_program import own_environment, own_program
-from protocol.progress import share_shown
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
+from protocol.program.own_program import own_environment, own_program
+from protocol.program.progress import share_shown
 from tools.mutation import COMPILED, MODULES, Mutation, mutations_of, planted
 
 EXPLAINED = Path(__file__).with_name("mutants.toml")

@@ -6,7 +6,7 @@ that survive, and the share that was killed. A mutant that may survive is listed
 `mutation_score.toml`.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the slow imports
+import protocol.program.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -27,9 +27,9 @@ from queue import SimpleQueue
 from random import Random
 from typing import Final, NamedTuple
 
-from protocol.command_line import Parser, program_name
-from protocol.ending import ended
-from protocol.progress import share_shown
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
+from protocol.program.progress import share_shown
 from tools.mutation import Mutation, mutated_source, mutations_of
 
 ROOT: Final = Path(__file__).parents[1]

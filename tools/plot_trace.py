@@ -3,15 +3,15 @@
 From top to bottom: reference and measured speed with their commands, position, and the state of the motor.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the slow imports
+import protocol.program.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
 import sys
 from pathlib import Path
 
-from protocol.command_line import Parser, program_name
-from protocol.ending import ended
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
 from tools.trace_signals import DEFAULT_SIGNALS, SIGNALS, check_signals
 
 _EXAMPLES = """examples:

@@ -12,7 +12,7 @@ from pathlib import Path
 from emulator.trace import read_trace
 from planner.plot_style import save_picture
 from protocol import TableClient
-from protocol.own_program import own_environment, own_program
+from protocol.program.own_program import own_environment, own_program
 from tools.trace_figure import draw_trace
 
 STEPS = (  # time in seconds, maximum speed deg/s, acceleration deg/s2, target deg

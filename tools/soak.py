@@ -3,7 +3,7 @@
 The tests run each soak at a small size; here it has its full size.
 """
 
-import protocol.quiet_start  # noqa: F401 - before the slow imports
+import protocol.program.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -22,11 +22,11 @@ from emulator.table.fast_ticks import FastTicks
 from emulator.table.table import Table
 from protocol.client import TableClient
 from protocol.codec import decode_reply
-from protocol.command_line import Parser, program_name
-from protocol.ending import ended
 from protocol.errors import TableError
 from protocol.messages import Angle, Ok, Refusal
-from protocol.own_program import own_environment, own_program
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
+from protocol.program.own_program import own_environment, own_program
 
 _TICK_HZ = 1000
 

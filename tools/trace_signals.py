@@ -1,6 +1,6 @@
 """Names of the trace columns that can be drawn; this module does not load matplotlib."""
 
-from protocol.data_file import did_you_mean
+from protocol.files.data_file import did_you_mean
 
 SIGNALS = (
     "reference_speed_deg_s",

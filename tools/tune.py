@@ -1,6 +1,6 @@
 """Tune the two gain sets from the table's model, within stated margins, and check them on the emulator."""
 
-import protocol.quiet_start  # noqa: F401 - before the slow imports
+import protocol.program.quiet_start  # noqa: F401 - before the slow imports
 
 # isort: split
 import argparse
@@ -9,8 +9,8 @@ from importlib import import_module
 from pathlib import Path
 
 from emulator.config.table_config import ConfigError
-from protocol.command_line import Parser, program_name
-from protocol.ending import ended
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
 from tools.bounds import Limits, TuningError
 
 _EXAMPLES = """examples:

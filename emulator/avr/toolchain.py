@@ -14,8 +14,8 @@ from tempfile import TemporaryDirectory
 from emulator.avr.errors import ToolchainError
 from emulator.avr.header import header_text
 from emulator.config.table_config import TableConfig
-from protocol.kept_file import cache_root
-from protocol.whole_file import whole_file
+from protocol.files.whole_file import whole_file
+from protocol.kernels.kept_file import cache_root
 
 FIRMWARE = Path(__file__).with_name("firmware")
 CONSTANTS = FIRMWARE / "table_constants.h"

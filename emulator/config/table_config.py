@@ -15,9 +15,9 @@ from emulator.faults.fault import FaultError, fault_from
 from emulator.firmware.fixed_point import ERROR_BITS, ERROR_MAX, gain_registers, motion_bits
 from emulator.int32 import INT32_MAX
 from protocol.bench import Fault
-from protocol.data_file import read_toml
-from protocol.toml_section import quantity, section
-from protocol.toml_table import TomlTable
+from protocol.files.data_file import read_toml
+from protocol.files.toml_section import quantity, section
+from protocol.files.toml_table import TomlTable
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from emulator.faults.parameter import Parameter
 from protocol.bench import Fault
-from protocol.data_file import shown
+from protocol.files.data_file import shown
 
 
 class FaultError(ValueError):

@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from emulator.ports.outbox import Outbox
 from emulator.ports.port import Arrival
-from protocol.data_file import shown
+from protocol.files.data_file import shown
 
 LOOPBACK = "127.0.0.1"
 READ_BYTES = 256

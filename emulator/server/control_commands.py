@@ -12,7 +12,7 @@ from emulator.faults.fault import KINDS, FaultError, fault_from, help_of, parame
 from emulator.faults.parameter import Parameter
 from emulator.server.clock import TIME_SCALE
 from protocol.bench import Bench
-from protocol.data_file import shown
+from protocol.files.data_file import shown
 
 
 class Stand(Protocol):

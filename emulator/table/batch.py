@@ -15,7 +15,7 @@ from emulator.firmware.controller import begin_motion, distance_to
 from emulator.firmware.profiler import Profile
 from emulator.plant.drive_train import DriveState
 from emulator.table.tick import TableConstants, TableState, step
-from protocol.interrupts import signals_wait
+from protocol.program.interrupts import signals_wait
 
 MOVE_TO: Final = 0
 MOVE_BY: Final = 1

@@ -12,8 +12,8 @@ from importlib.util import find_spec
 from typing import Final
 
 from emulator.table.tick import TableConstants, TableState, run_undisturbed
-from protocol.interrupts import signals_wait
-from protocol.kept_code import is_kept
+from protocol.kernels.kept_code import is_kept
+from protocol.program.interrupts import signals_wait
 
 Run = Callable[[TableConstants, TableState, float, int], tuple[TableState, bool]]
 """Computes undisturbed ticks; see `tick.run_undisturbed`."""

@@ -10,7 +10,7 @@ from emulator import int32
 from emulator.firmware import controller, fixed_point, pid, profiler
 from emulator.plant import drive_train, encoder, friction
 from emulator.table import tick
-from protocol.machine_code import compiled, inlined
+from protocol.kernels.machine_code import compiled, inlined
 
 __all__ = ["compiled", "inlined"]
 

@@ -9,7 +9,7 @@ from planner.plot_style import svg_of
 from planner.scanning.coverage import REASONS
 from planner.scanning.scan_plots import STATE_NAMES
 from planner.scanning.scan_report import scan_blocks
-from protocol.page import Cell, Marked, Origin, counted, figure, heading, page, paragraph, table, verdict
+from protocol.program.page import Cell, Marked, Origin, counted, figure, heading, page, paragraph, table, verdict
 
 # Regions that get a row of their own.
 _REGIONS = 10

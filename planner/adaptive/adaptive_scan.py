@@ -41,7 +41,7 @@ from planner.scanning.scan_run import (
     probe_of,
     table_at_port,
 )
-from protocol.progress import ProgressOf
+from protocol.program.progress import ProgressOf
 
 # Distance of a strip's profiles, as a share of the largest distance without a gap: one profile may be missing.
 _DENSITY = 0.4

@@ -26,7 +26,7 @@ from planner.scanning.coverage import Coverage
 from planner.scanning.error_budget import signed_distances_mm
 from planner.scanning.measuring import COVERED_MM
 from planner.scanning.probe import LaserProbe, Sight
-from protocol.progress import Progress
+from protocol.program.progress import Progress
 
 # A strip of fewer poses is not worth the way to it.
 _FEWEST_POSES = 3

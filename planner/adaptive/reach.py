@@ -15,7 +15,7 @@ from planner.arrays import BoolArray, FloatArray, IndexArray
 from planner.cell.obstacles import Obstacle
 from planner.kinematics.configuration import Configuration
 from planner.map.map_builder import build_maps
-from protocol.progress import Progress
+from protocol.program.progress import Progress
 
 ANGLES = 36
 """Table angles over one turn at which the reach is looked for."""

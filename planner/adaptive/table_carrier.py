@@ -24,7 +24,7 @@ from planner.kinematics.configuration import Configuration
 from planner.planning.planners import PLANNERS
 from planner.scanning.latched_run import LatchedRun
 from planner.scanning.scan_run import ScanOptions, TableAtPort, check_motion, run_on_table
-from protocol.progress import Progress
+from protocol.program.progress import Progress
 from protocol.trapezoid import MotionCommand, ReferenceState, time_to_rest_s
 
 # Share of the map's minimum clearance that has to be kept between strips.

@@ -27,7 +27,7 @@ from planner.scanning.error_budget import signed_distances_mm
 from planner.scanning.point_cloud import PlyWriter, read_cloud
 from planner.scanning.probe import Sight
 from planner.scanning.scan_run import CLOUD_FILE, ScanOptions, write_surface
-from protocol.progress import ProgressOf
+from protocol.program.progress import ProgressOf
 
 TURNED_FOLDER, JOINED_FILE = "turned", "joined.ply"
 _CELL_MM = 1.0

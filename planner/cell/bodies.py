@@ -8,7 +8,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.cell.cell import Probe
 from planner.errors import ScanFileError
-from protocol.toml_table import TomlTable
+from protocol.files.toml_table import TomlTable
 
 _SHIPPED = Path(__file__).parents[1] / "bodies"
 

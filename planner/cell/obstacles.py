@@ -14,7 +14,7 @@ from planner.cell.workpiece import Cylinder, Sphere
 from planner.geometry.box_distance import FIELD
 from planner.geometry.signed_distance_field import SignedDistanceField, cached_field
 from planner.geometry.solid import BOX, CAPSULE, CYLINDER
-from protocol.progress import Progress
+from protocol.program.progress import Progress
 
 _FLOOR_SIDE_MM = 10_000.0
 _FLOOR_THICKNESS_MM = 100.0

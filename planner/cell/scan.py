@@ -27,9 +27,9 @@ from planner.kinematics.arm import Arm, shipped_arms
 from planner.kinematics.value import ValueFunction
 from planner.table.cost import Weights, costs_overflow, default_weights
 from planner.table.motion import Limits
-from protocol.data_file import did_you_mean
-from protocol.progress import Progress
-from protocol.toml_table import TomlTable
+from protocol.files.data_file import did_you_mean
+from protocol.files.toml_table import TomlTable
+from protocol.program.progress import Progress
 
 DEFAULT_ARM = "viper_s650"
 ADAPTIVE = "adaptive"

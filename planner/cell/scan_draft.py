@@ -22,7 +22,7 @@ from planner.kinematics.arm import Arm
 from planner.kinematics.value import ValueFunction
 from planner.table.cost import default_weights
 from planner.table.motion import Limits
-from protocol.command_line import program_name
+from protocol.program.command_line import program_name
 
 TURN_TO_UP = {
     "z": (0.0, 0.0, 0.0),

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from planner.arrays import FloatArray
 from planner.errors import PathError
 from planner.geometry.transforms import first_not_rigid, from_xyz_yaw_pitch_roll, nearest_rigid
-from protocol.data_file import DataFileError, read_json, read_text, shown
+from protocol.files.data_file import DataFileError, read_json, read_text, shown
 
 MOST_LOCATIONS = 20_000
 """More than any useful path: a day at one location every 4 s."""

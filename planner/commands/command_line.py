@@ -25,9 +25,9 @@ from planner.defaults import (
     shipped_scans,
 )
 from planner.plug_ins import PLANNER_GROUP, plug_in_names
-from protocol.command_line import Parser, program_name
-from protocol.data_file import did_you_mean
-from protocol.number_options import number, positive_number, share, whole_number
+from protocol.files.data_file import did_you_mean
+from protocol.program.command_line import Parser, program_name
+from protocol.program.number_options import number, positive_number, share, whole_number
 
 _Commands = "argparse._SubParsersAction[Parser]"
 

@@ -17,7 +17,7 @@ from planner.map.map_file import MAP_FILE, save_maps
 from planner.map.map_plots import plot_map, plot_map_cylinder
 from planner.map.map_problem import map_problem
 from planner.set_aside import set_aside
-from protocol.progress import progress_line
+from protocol.program.progress import progress_line
 
 MAP_RESULTS = (MAP_FILE, "map.png", "map_cylinder.png")
 

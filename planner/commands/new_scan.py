@@ -22,9 +22,9 @@ from planner.plans.arm_motion import ArmMotion
 from planner.plans.plan import Plan
 from planner.plans.problem import Problem
 from planner.plans.verification import verify
-from protocol.command_line import program_name
-from protocol.progress import progress_line
-from protocol.whole_file import write_whole
+from protocol.files.whole_file import write_whole
+from protocol.program.command_line import program_name
+from protocol.program.progress import progress_line
 
 # At a deviation of the table as large as allowed in a run, plus a margin, nothing forbidden may be touched.
 _OFF_DEG = TOLERANCE_DEG + 0.05

@@ -26,7 +26,7 @@ from planner.plans.problem import Problem
 from planner.plans.verification import verify
 from planner.plug_ins import PlugInError
 from planner.set_aside import set_aside
-from protocol.progress import progress_line
+from protocol.program.progress import progress_line
 
 _NO_PLAN = 1
 # A run belongs to its plan: beside another plan, it would be taken for a run of that plan.

@@ -9,8 +9,8 @@ from planner.errors import PlannerError
 from planner.execution.run import RunOptions, run_plan
 from planner.execution.run_verification import RunVerification
 from protocol import TableError
-from protocol.color import colored
-from protocol.progress import progress_line
+from protocol.program.color import colored
+from protocol.program.progress import progress_line
 
 _DEVIATED, _NOT_RUN = 1, 2
 

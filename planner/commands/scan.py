@@ -27,11 +27,11 @@ from planner.scanning.scan_report import scan_report, verdict_of
 from planner.scanning.scan_run import Scanned, ScanOptions, scan_workpiece
 from planner.set_aside import set_aside
 from protocol import TableError
-from protocol.color import colored
-from protocol.extras import need
-from protocol.page import Origin
-from protocol.progress import Progress, progress_line, show_line
-from protocol.whole_file import write_whole
+from protocol.files.whole_file import write_whole
+from protocol.program.color import colored
+from protocol.program.extras import need
+from protocol.program.page import Origin
+from protocol.program.progress import Progress, progress_line, show_line
 
 _INCOMPLETE = 1
 SCAN_RESULTS = ("cloud.ply", "cloud.xyz", "normals.ply", "poses.csv", JOINED_FILE, "scan.json", REPORT_FILE)

@@ -14,7 +14,7 @@ from planner.tracking.track_file import decision_times_s
 from planner.tracking.track_report import track_blocks
 from planner.tracking.track_run import RESULTS, Finished, TrackOptions, track_scan
 from protocol import TableError
-from protocol.progress import progress_line
+from protocol.program.progress import progress_line
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -19,8 +19,8 @@ from planner.table.motion import Limits
 from planner.table.wire import Grid, Wire, command_line, exchanges_s
 from protocol import ArrivalTimeout, CommandRefused, TableClient, TableError, Verb
 from protocol.bench import GroundTruth
-from protocol.interrupts import signals_wait
-from protocol.progress import Progress
+from protocol.program.interrupts import signals_wait
+from protocol.program.progress import Progress
 from protocol.trapezoid import MotionCommand, ReferenceState, time_to_rest_s
 
 # Margin between the last reading and the next command for delays of the operating system.

@@ -34,7 +34,7 @@ from planner.table.wire import Wire
 from protocol import TableClient
 from protocol.bench import bench_of
 from protocol.control_channel import ControlChannel
-from protocol.progress import Progress
+from protocol.program.progress import Progress
 
 _log = logging.getLogger(__name__)
 

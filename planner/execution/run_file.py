@@ -24,10 +24,10 @@ from planner.execution.table_motion import PauseTimes, Phase, TableMotion
 from planner.map.map_file import MAP_FILE
 from planner.plans.plan_file import PLAN_FILE
 from planner.table.wire import Wire
-from protocol.command_line import program_name
-from protocol.data_file import DataFileError, read_json
+from protocol.files.data_file import DataFileError, read_json
+from protocol.files.whole_file import whole_file, write_whole
+from protocol.program.command_line import program_name
 from protocol.trapezoid import MotionCommand
-from protocol.whole_file import whole_file, write_whole
 
 _FORMAT = "seventh-axis run"
 _FORMAT_VERSION = 1

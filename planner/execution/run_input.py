@@ -18,7 +18,7 @@ from planner.plans.plan_check import contradiction
 from planner.plans.plan_file import StoredPlan, load_plan
 from planner.plans.problem import Problem
 from planner.plans.verification import verify
-from protocol.command_line import program_name
+from protocol.program.command_line import program_name
 
 
 class RunInputError(PlannerError):

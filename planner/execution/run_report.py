@@ -7,9 +7,9 @@ from planner.execution.run_file import StoredRun, load_run
 from planner.execution.run_plots import deviation_figure, map_figure, motion_figure
 from planner.execution.run_verification import RunVerification, verify_run
 from planner.plot_style import svg_of
-from protocol import page as html
-from protocol.page import Origin, counted, details, figure, heading, paragraph, table, verdict
-from protocol.whole_file import write_whole
+from protocol.files.whole_file import write_whole
+from protocol.program import page as html
+from protocol.program.page import Origin, counted, details, figure, heading, paragraph, table, verdict
 
 _NAMES = {
     "encoder": "encoder",

@@ -14,7 +14,7 @@ from planner.execution.table_motion import MotionInTime
 from planner.table.wire import Wire
 from protocol import TableClient, TableError
 from protocol.bench import GroundTruth
-from protocol.progress import Progress
+from protocol.program.progress import Progress
 
 # Number of bytes of H, or of L, and of its reply.
 _QUESTION_BYTES, _ANSWER_BYTES = 2, 10

@@ -14,7 +14,7 @@ from planner.geometry.components import connected
 from planner.geometry.edges import edges_of
 from planner.geometry.winding_number import solid_angles
 from planner.kernel import kernel
-from protocol.progress import Progress
+from protocol.program.progress import Progress
 
 _TOUCHING = 1e-6
 """Maximum depth to which bodies may penetrate each other and still only touch, relative to the mesh's longest side."""

@@ -12,7 +12,7 @@ from planner.errors import WorkpieceError
 from planner.geometry.closed_surface import closed_surface
 from planner.geometry.crossing import first_crossing
 from planner.geometry.mesh_file import read_mesh_file
-from protocol.progress import Progress
+from protocol.program.progress import Progress
 
 # Plausible sizes of a part for a probe with a line of 60 mm and an arm with a reach of 650 mm.
 SMALLEST_MM = 10.0

@@ -20,8 +20,8 @@ from planner.geometry.bounding_volume_hierarchy import bounding_volume_hierarchy
 from planner.geometry.shells import turned_outward
 from planner.geometry.winding_number import BESIDE, winding_numbers
 from planner.kernel import kernel
-from protocol.kept_file import FIELD, cache_root, keep_file, load_file
-from protocol.progress import Progress
+from protocol.kernels.kept_file import FIELD, cache_root, keep_file, load_file
+from protocol.program.progress import Progress
 
 _MOST_POINTS = 4_000_000
 _RULES = b"nested grids, any winding, signs by the nesting of shells"

@@ -15,7 +15,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.errors import ArmTableError, ScanFileError
 from planner.kernel import kernel
-from protocol.toml_table import TomlTable
+from protocol.files.toml_table import TomlTable
 
 _SHIPPED = Path(__file__).parents[1] / "arms"
 _ORTHO_PARALLEL_ALPHA_DEG = (-90.0, 0.0, 90.0, -90.0, 90.0, 0.0)

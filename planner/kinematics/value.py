@@ -18,7 +18,7 @@ from planner.kernel import kernel
 from planner.kinematics.arm import Arm
 from planner.kinematics.configuration import Configuration
 from planner.plug_ins import FACTOR_GROUP, PlugInError, failure, load_plug_in
-from protocol.toml_table import TomlTable
+from protocol.files.toml_table import TomlTable
 
 JOINT_FACTORS = tuple(f"joint_{joint}" for joint in range(1, 7))
 WRIST_FACTOR = "wrist"

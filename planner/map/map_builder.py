@@ -37,8 +37,8 @@ from planner.map.config_map import DEFAULT_EPSILON, ConfigurationMap, Configurat
 from planner.map.map_problem import MapProblem
 from planner.map.map_reasons import FIRST_PAIR, FIRST_USER_FACTOR, reason_texts
 from planner.reasons import Reason
-from protocol.kept_code import is_kept
-from protocol.progress import Progress
+from protocol.kernels.kept_code import is_kept
+from protocol.program.progress import Progress
 
 _REACHED = int(Reason.REACHED)
 _SINGULAR = int(Reason.SINGULAR)

@@ -17,8 +17,8 @@ import numpy as np
 from planner.errors import PlannerError
 from planner.kinematics.configuration import Configuration
 from planner.map.config_map import ConfigurationMap, ConfigurationMapError
-from protocol.software_version import software_version
-from protocol.whole_file import whole_file
+from protocol.files.whole_file import whole_file
+from protocol.program.software_version import software_version
 
 _log = logging.getLogger(__name__)
 

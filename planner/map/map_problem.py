@@ -8,7 +8,7 @@ from planner.cell.collision_model import CollisionModel, collision_model
 from planner.cell.obstacles import cell_obstacles, workpiece_obstacle
 from planner.cell.scan import Scan
 from planner.kinematics.value import ValueFunction
-from protocol.progress import Progress
+from protocol.program.progress import Progress
 
 
 @dataclass(frozen=True, eq=False)

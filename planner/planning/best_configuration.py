@@ -8,7 +8,7 @@ from planner.cell.unit_hints import unit_hint
 from planner.plans.arm_motion import arm_follows
 from planner.plans.plan import Infeasibility, NoPlan, Outcome, Plan, Planner
 from planner.plans.problem import Problem
-from protocol.progress import Progress
+from protocol.program.progress import Progress
 
 
 class Comparison(NamedTuple):

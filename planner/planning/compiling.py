@@ -29,9 +29,9 @@ from planner.plans.problem import Problem
 from planner.plans.verification import verify
 from planner.search.lattice_cost_to_go import cost_to_go
 from planner.search.unreachability_proof import first_unreachable_location
-from protocol.kept_code import is_kept
-from protocol.own_program import own_environment, own_program
-from protocol.progress import ProgressOf
+from protocol.kernels.kept_code import is_kept
+from protocol.program.own_program import own_environment, own_program
+from protocol.program.progress import ProgressOf
 
 _ANY = Configuration.LEFTY_ABOVE_NOFLIP
 

@@ -19,7 +19,7 @@ from planner.plans.plan import Outcome, Plan, Planner
 from planner.plans.plan_file import PLAN_FILE, plan_document, save_plan
 from planner.plans.problem import Problem
 from planner.plans.verification import Verification, verify
-from protocol.progress import ProgressOf
+from protocol.program.progress import ProgressOf
 
 _log = logging.getLogger(__name__)
 

@@ -19,10 +19,10 @@ from planner.plans.problem import Problem
 from planner.plans.verification import verify
 from planner.table.cost import PathCost, Weights
 from planner.table.motion import Limits
-from protocol.command_line import program_name
-from protocol.data_file import DataFileError, read_json
-from protocol.software_version import software_version
-from protocol.whole_file import write_whole
+from protocol.files.data_file import DataFileError, read_json
+from protocol.files.whole_file import write_whole
+from protocol.program.command_line import program_name
+from protocol.program.software_version import software_version
 
 PLAN_FILE = "plan.json"
 _FORMAT = "seventh-axis plan"

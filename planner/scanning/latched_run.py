@@ -23,7 +23,7 @@ from planner.scanning.trigger_line import TableTruth, TriggerFaults, TriggerLine
 from planner.table.motion import Limits
 from planner.table.wire import Wire
 from protocol import TableClient
-from protocol.progress import Progress
+from protocol.program.progress import Progress
 
 # Time of the first profile: the first command has been sent by then.
 _FIRST_PROFILE_S = 0.06

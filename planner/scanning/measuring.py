@@ -13,7 +13,7 @@ from planner.scanning.coverage import Coverage
 from planner.scanning.error_budget import Chain, Samples
 from planner.scanning.point_cloud import PlyWriter, XyzWriter
 from planner.scanning.probe import LaserProbe, measure
-from protocol.progress import Progress
+from protocol.program.progress import Progress
 
 # Profiles that are measured at once: some 40 000 points.
 _BLOCK = 64

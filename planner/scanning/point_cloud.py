@@ -10,7 +10,7 @@ import numpy as np
 from plyfile import PlyData
 
 from planner.arrays import FloatArray, IndexArray
-from protocol.whole_file import whole_file
+from protocol.files.whole_file import whole_file
 
 # A vertex in the file. Single precision has an error of 0.03 micrometers at 500 mm.
 _COORDINATES = ("x", "y", "z", "beam_x", "beam_y", "beam_z")

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from planner.arrays import FloatArray, IndexArray
-from protocol.whole_file import write_whole
+from protocol.files.whole_file import write_whole
 
 _POSE = ("x_mm", "y_mm", "z_mm", "qx", "qy", "qz", "qw")
 POSE_COLUMNS = (

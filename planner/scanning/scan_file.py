@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from planner.scanning.scan_run import Knowledge, Scanned
-from protocol.whole_file import write_whole
+from protocol.files.whole_file import write_whole
 
 _FORMAT = "seventh-axis scan"
 _FORMAT_VERSION = 1

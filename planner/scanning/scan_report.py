@@ -13,7 +13,7 @@ from planner.scanning.probe import Sight
 from planner.scanning.probe_calibration import ProbeCalibration
 from planner.scanning.scan_plots import STATE_NAMES, budget_figure, coverage_figure
 from planner.scanning.scan_run import Scanned
-from protocol.page import Origin, counted, figure, heading, page, paragraph, table, verdict
+from protocol.program.page import Origin, counted, figure, heading, page, paragraph, table, verdict
 
 _MICROMETERS = 1e3
 

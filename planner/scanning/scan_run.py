@@ -44,7 +44,7 @@ from planner.table.wire import Wire
 from protocol import Port, TableClient
 from protocol.bench import bench_of
 from protocol.control_channel import ControlChannel
-from protocol.progress import Progress, ProgressOf
+from protocol.program.progress import Progress, ProgressOf
 
 CLOUD_FILE, XYZ_FILE, POSES_FILE = "cloud.ply", "cloud.xyz", "poses.csv"
 # Cells of the thinned cloud, and how far the neighbors are that a normal is made from.

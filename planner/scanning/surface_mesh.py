@@ -12,7 +12,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from planner.arrays import FloatArray, IndexArray
-from protocol.whole_file import whole_file
+from protocol.files.whole_file import whole_file
 
 _DEEPEST = 10
 """Levels of the octree: 1024 cells along the part."""

@@ -15,7 +15,7 @@ import numpy as np
 from planner.arrays import FloatArray
 from planner.cell.scan_path import pose_of
 from planner.errors import PathError
-from protocol.data_file import shown
+from protocol.files.data_file import shown
 
 END = "end"
 _LONGEST_LINE = 4096

@@ -9,7 +9,7 @@ from planner.tracking.online_planner import Step
 from planner.tracking.price import Price
 from planner.tracking.track_record import TrackRecord
 from planner.tracking.tracker import Tracker
-from protocol.whole_file import write_whole
+from protocol.files.whole_file import write_whole
 
 _FORMAT = "seventh-axis track"
 _FORMAT_VERSION = 1

@@ -7,8 +7,8 @@ from typing import Any
 
 from planner.errors import PlannerError
 from planner.tracking.track_file import TRACK_FILE, TRACK_PICTURE
-from protocol.data_file import DataFileError, read_json
-from protocol.page import counted, heading, paragraph, table
+from protocol.files.data_file import DataFileError, read_json
+from protocol.program.page import counted, heading, paragraph, table
 
 
 class TrackFileError(PlannerError):

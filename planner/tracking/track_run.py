@@ -46,7 +46,7 @@ from protocol import TableClient
 from protocol.bench import bench_of
 from protocol.clock import WallClock
 from protocol.control_channel import ControlChannel
-from protocol.progress import Progress, ProgressOf
+from protocol.program.progress import Progress, ProgressOf
 
 RESULTS = (*RUN_RESULTS, PLAN_FILE, MAP_FILE, *TRACK_RESULTS)
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from protocol.bench import BenchError
-from protocol.command_line import Parser, program_name
 from protocol.conformance.bench.ports import SessionError, open_port
 from protocol.conformance.cases.case import Case
 from protocol.conformance.cases.catalog import chosen_cases
@@ -15,7 +14,8 @@ from protocol.conformance.commands.replay_run import run_replay
 from protocol.conformance.commands.suite_run import run_suite
 from protocol.conformance.profile.profile import ProfileError, load_profile
 from protocol.conformance.results.record import RecordError
-from protocol.ending import ended
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
 
 _EXAMPLE = """examples:
   {conform} --port emulator:// --out build/conformance

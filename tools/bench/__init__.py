@@ -1,3 +1,3 @@
 """Benchmarks; each file is named after what it measures."""
 
-import protocol.quiet_start  # noqa: F401 - before the slow imports
+import protocol.program.quiet_start  # noqa: F401 - before the slow imports

@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 
-from protocol.command_line import Parser, program_name
-from protocol.ending import ended
+from protocol.program.command_line import Parser, program_name
+from protocol.program.ending import ended
 
 SUBJECTS = (
     "adaptive", "avr", "calibration", "emulator", "identify", "map", "planner", "scan", "stop", "stream", "track",

@@ -23,7 +23,7 @@ from emulator.table import batch
 from emulator.table.interpreter import Interpreter
 from emulator.table.table import Table
 from emulator.table.tick import TableConstants, TableState
-from protocol.own_program import own_environment, own_program
+from protocol.program.own_program import own_environment, own_program
 from tools.bench.timing import median_s, percentile, print_table
 from tools.bench.virtual_run import random_run_inputs, run_in_virtual_time
 

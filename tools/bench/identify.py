@@ -18,7 +18,7 @@ from typing import NamedTuple, TextIO
 import emulator  # noqa: F401  # teaches pyserial the port emulator://
 from emulator.config.table_config import load_config
 from protocol.client import TableClient
-from protocol.own_program import own_environment, own_program
+from protocol.program.own_program import own_environment, own_program
 from tools.bench.identify_tables import DEFAULT, NARROW, WIDE, Family, write_constants
 from tools.bench.timing import percentile, print_row, print_table
 from tools.identification.constants import DERIVED

@@ -21,7 +21,7 @@ from planner.kinematics.configuration import Configuration
 from planner.kinematics.inverse_kinematics import inverse_kinematics
 from planner.map.map_builder import build_maps
 from planner.map.map_problem import MapProblem, map_problem
-from protocol.own_program import own_environment, own_program
+from protocol.program.own_program import own_environment, own_program
 from tools.bench.timing import median_s, print_table
 
 POSES = 20_000

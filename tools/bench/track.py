@@ -33,7 +33,7 @@ from planner.tracking.decision import METHODS, costs_of_starts
 from planner.tracking.online_planner import Blocked, Kind, OnlinePlanner, State, Step, may_rest
 from planner.tracking.revealed_map import RevealedMap
 from planner.tracking.tracker import Tracker, TrackSettings
-from protocol.own_program import own_environment, own_program
+from protocol.program.own_program import own_environment, own_program
 from tools.bench.timing import percentile, print_table
 from tools.bench.track_plot import plot_views
 

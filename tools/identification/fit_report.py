@@ -5,8 +5,8 @@ from matplotlib.figure import Figure
 
 from emulator.config.table_config import TableConfig
 from planner.plot_style import BLUE, EXECUTED, PLANNED, new_figure, styled, svg_of
-from protocol.page import Marked, Origin, counted, figure, heading, page, paragraph, table
-from protocol.page import verdict as headline
+from protocol.program.page import Marked, Origin, counted, figure, heading, page, paragraph, table
+from protocol.program.page import verdict as headline
 from tools.config_file import config_toml
 from tools.identification.constants import Constant
 from tools.identification.fit_checks import MOST_UNEXPLAINED_DEG, halves_of, unexplained_rms_deg

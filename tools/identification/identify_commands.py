@@ -7,9 +7,9 @@ from pathlib import Path
 
 from emulator.config.table_config import load_config
 from protocol.client import TableClient
-from protocol.page import Origin
-from protocol.progress import share_shown
-from protocol.whole_file import write_whole
+from protocol.files.whole_file import write_whole
+from protocol.program.page import Origin
+from protocol.program.progress import share_shown
 from tools.command_line import check_writable
 from tools.identification.errors import RecordingError
 from tools.identification.excitation import excitation

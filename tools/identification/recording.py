@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from protocol.data_file import shortened
-from protocol.whole_file import whole_file
+from protocol.files.data_file import shortened
+from protocol.files.whole_file import whole_file
 from tools.emulated import Array
 from tools.identification.csv_table import Row, Table, check_decimals, read_table
 from tools.identification.errors import RecordingError

@@ -18,7 +18,7 @@ from emulator.plant import drive_train
 from emulator.plant.drive_train import DriveState, DriveTrain, at_standstill
 from emulator.table.batch import COLUMNS, run
 from emulator.table.tick import table_constants, woken
-from protocol.interrupts import signals_wait
+from protocol.program.interrupts import signals_wait
 from tools.emulated import Array, Motion, motion_rows
 from tools.identification.recording import DriveRecording, WireRecording
 

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from protocol.command_line import Parser
+from protocol.program.command_line import Parser
 from tools.prose.rules import Finding, findings, load_rules, python_findings
 from tools.reference.command_pages import options, programs, subcommands
 

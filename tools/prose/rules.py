@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from protocol.data_file import read_toml
+from protocol.files.data_file import read_toml
 from tools.prose.python_texts import texts
 
 VOCABULARY = Path(__file__).with_name("vocabulary.toml")

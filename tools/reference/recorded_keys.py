@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from protocol.data_file import DataFileError
-from protocol.toml_table import TomlTable
+from protocol.files.data_file import DataFileError
+from protocol.files.toml_table import TomlTable
 from tools.reference.keys import Key
 
 READERS = ("number", "count", "switch", "numbers", "text", "texts", "choice")

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from emulator.config.table_config import TableConfig
-from protocol.page import Cell, Marked, table
+from protocol.program.page import Cell, Marked, table
 from tools.bounds import Limits
 from tools.tuning.gain_design import Design
 from tools.tuning.linear_model import duty_gains

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from emulator.config.table_config import ConfigError, GainSetsConfig, TableConfig, load_config
-from protocol.data_file import read_toml
+from protocol.files.data_file import read_toml
 
 
 def given_gains(path: Path, config_path: Path | None) -> tuple[TableConfig, GainSetsConfig]:

@@ -16,8 +16,8 @@ import numpy as np
 from emulator.config.constants import fixed_gains
 from emulator.config.table_config import ConfigError, GainsConfig, TableConfig
 from emulator.firmware.pid import Gains
-from protocol.toml_section import section
-from protocol.toml_table import TomlTable
+from protocol.files.toml_section import section
+from protocol.files.toml_table import TomlTable
 from tools.tuning.linear_model import Teeth, duty_gains, held_motor, plant
 
 INTEGRAL_STATE = -2

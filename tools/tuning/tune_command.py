@@ -8,11 +8,11 @@ from math import inf
 from pathlib import Path
 
 from emulator.config.table_config import load_config
-from protocol.color import colored
-from protocol.command_line import program_name
-from protocol.page import Origin
-from protocol.progress import share_shown
-from protocol.whole_file import whole_file
+from protocol.files.whole_file import whole_file
+from protocol.program.color import colored
+from protocol.program.command_line import program_name
+from protocol.program.page import Origin
+from protocol.program.progress import share_shown
 from tools.bounds import Limits, TuningError
 from tools.command_line import check_folder
 from tools.tuning.figures_json import figures_json

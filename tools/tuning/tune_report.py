@@ -3,8 +3,8 @@
 import numpy as np
 
 from emulator.firmware.pid import Gains
-from protocol.page import Cell, Kind, Marked, Origin, details, figure, heading, page, paragraph, table
-from protocol.page import verdict as headline
+from protocol.program.page import Cell, Kind, Marked, Origin, details, figure, heading, page, paragraph, table
+from protocol.program.page import verdict as headline
 from tools.bounds import Bound
 from tools.tuning.check import Figure
 from tools.tuning.checks import differs

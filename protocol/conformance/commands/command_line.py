@@ -2,12 +2,12 @@
 
 import sys
 
-from protocol import ending
-from protocol.command_line import program_name, report, report_error
 from protocol.conformance.bench.ports import is_simulated
 from protocol.conformance.bench.wire import ReopenablePort
 from protocol.conformance.profile.profile import Profile
-from protocol.progress import is_terminal, show_line
+from protocol.program import ending
+from protocol.program.command_line import program_name, report, report_error
+from protocol.program.progress import is_terminal, show_line
 
 
 class UsageError(Exception):

@@ -10,8 +10,6 @@ from functools import partial
 from pathlib import Path
 
 from protocol.clock import WallClock
-from protocol.color import colored
-from protocol.command_line import program_name
 from protocol.conformance.bench.host_watch import watch_in
 from protocol.conformance.bench.ports import described, is_simulated
 from protocol.conformance.bench.stand import stand_beside
@@ -24,7 +22,9 @@ from protocol.conformance.profile.profile import Profile
 from protocol.conformance.results.record import Header, count_verdicts, write_junit, write_record
 from protocol.conformance.results.report import write_report
 from protocol.conformance.session.suite import Outcome, session_at
-from protocol.interrupts import status_after
+from protocol.program.color import colored
+from protocol.program.command_line import program_name
+from protocol.program.interrupts import status_after
 
 _BAD = {Verdict.FAIL, Verdict.ERROR}
 _NO_FILES = 2

@@ -14,9 +14,9 @@ from protocol.conformance.profile.sections import (
     TableProfile,
     Tolerance,
 )
-from protocol.data_file import read_toml
-from protocol.toml_section import section
-from protocol.toml_table import TomlTable
+from protocol.files.data_file import read_toml
+from protocol.files.toml_section import section
+from protocol.files.toml_table import TomlTable
 
 DEFAULT_FILE = Path(__file__).with_name("default.toml")
 

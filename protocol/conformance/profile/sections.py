@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from protocol.toml_section import quantity
+from protocol.files.toml_section import quantity
 
 
 def _amount() -> Any:  # noqa: ANN401  # returned in place of a value of the annotated type

@@ -17,7 +17,7 @@ from protocol.conformance.bench.stand import POWER_CYCLE, TRIGGER, Stand, stand_
 from protocol.conformance.bench.wire import ReopenablePort
 from protocol.conformance.profile.profile import Profile, ProfileError, load_profile
 from protocol.errors import TableError
-from protocol.own_program import own_environment, own_program
+from protocol.program.own_program import own_environment, own_program
 
 PTY = "pty"
 """Given instead of a port's URL: a new emulator on a pseudo-terminal."""

@@ -17,7 +17,7 @@ from protocol.conformance.judgement.verdict import Verdict
 from protocol.conformance.profile.profile import ProfileError, load_profile
 from protocol.conformance.pytest.fixture import PTY, pty_emulator
 from protocol.conformance.session.suite import Session, session_at
-from protocol.interrupts import ended_by_signals
+from protocol.program.interrupts import ended_by_signals
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any, Literal
 from xml.etree import ElementTree as ET
 
-from protocol import whole_file
 from protocol.conformance.bench.wire import Event
 from protocol.conformance.judgement.reference import Expectation, MotionRecord, Sample
 from protocol.conformance.judgement.verdict import Measurement, Verdict
 from protocol.conformance.profile.profile import Profile, ProfileError, profile_from
 from protocol.conformance.session.suite import Outcome
-from protocol.data_file import DataFileError, read_json
+from protocol.files import whole_file
+from protocol.files.data_file import DataFileError, read_json
 
 FORMAT = "seventh-axis conformance record"
 VERSION = 1

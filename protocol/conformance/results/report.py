@@ -16,7 +16,7 @@ from protocol.conformance.judgement.verdict import Measurement, Verdict
 from protocol.conformance.results.record import Header, count_verdicts, versions, write_whole
 from protocol.conformance.results.svg_plot import Panel, plot, range_bar
 from protocol.conformance.session.suite import Outcome
-from protocol.page import Origin, counted, page, paragraph, verdict
+from protocol.program.page import Origin, counted, page, paragraph, verdict
 
 _CHAPTERS = {
     "2": "The serial line",

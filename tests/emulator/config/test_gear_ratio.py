@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from emulator.config.gear_ratio import simplest_fraction
-from protocol.toml_table import TomlTable
+from protocol.files.toml_table import TomlTable
 
 teeth = st.integers(1, 60_000)
 

@@ -22,7 +22,7 @@ from planner.kinematics.value import (
     joints_value,
     wrist_factor,
 )
-from protocol.toml_table import TomlTable
+from protocol.files.toml_table import TomlTable
 
 DEFAULT = ValueFunction()
 

@@ -13,7 +13,7 @@ from emulator.faults.fault import KINDS, parameters_of
 from planner.cell.cell import Table
 from planner.cell.workpiece import CLASSES
 from protocol.conformance.profile.profile import load_profile
-from protocol.toml_table import TomlTable
+from protocol.files.toml_table import TomlTable
 from tools.reference.keys import Key, comments, key_page
 from tools.reference.planner_keys import arm_keys, bodies_keys, scan_keys
 from tools.reference.profile_keys import profile_keys

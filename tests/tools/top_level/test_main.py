@@ -23,7 +23,7 @@ def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 def test_each_command_leads_to_a_program_that_calls_itself_so(
     name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("protocol.command_line._names", {})
+    monkeypatch.setattr("protocol.program.command_line._names", {})
     with pytest.raises(SystemExit) as ended:
         main([name, "--help"])
     assert ended.value.code == 0
@@ -45,7 +45,7 @@ def test_the_option_for_debug_messages_may_stand_before_the_command(tmp_path: Pa
     done = run(tmp_path, "-v", "conform", "--port", "emulator://", "--case", "7.1/1", "--out", "out")
     assert done.returncode == 0
     assert "protocol.conformance.session.suite: case 7.1/1\n" in done.stderr
-    assert "protocol.whole_file: wrote out/report.html\n" in done.stderr
+    assert "protocol.files.whole_file: wrote out/report.html\n" in done.stderr
     assert "s protocol." not in run(tmp_path, "conform", "--list", "--case", "7.1/1").stderr
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from seventh_axis.home import HOME, hidden
 
 if TYPE_CHECKING:
-    from protocol.command_line import Parser
+    from protocol.program.command_line import Parser
 
 _BAD_INPUT = 2
 _NAME = "seventh-axis"
@@ -67,8 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _complete()
     if command is None:
         return _answer(words)
-    import protocol.quiet_start  # noqa: F401, PLC0415  # before the slow imports
-    from protocol.command_line import call_programs  # noqa: PLC0415  # see `seventh_axis`
+    import protocol.program.quiet_start  # noqa: F401, PLC0415  # before the slow imports
+    from protocol.program.command_line import call_programs  # noqa: PLC0415  # see `seventh_axis`
 
     call_programs(program_names())
     return int(import_module(command.module).main(words if command.by_name else words[1:]))
@@ -99,7 +99,7 @@ def _answer(words: Sequence[str]) -> int:
 def _parser() -> "Parser":
     from argparse import RawDescriptionHelpFormatter  # noqa: PLC0415  # a command needs another parser than this
 
-    from protocol.command_line import Parser  # noqa: PLC0415  # see `seventh_axis`
+    from protocol.program.command_line import Parser  # noqa: PLC0415  # see `seventh_axis`
 
     parser = Parser(
         prog=_NAME,
@@ -116,7 +116,7 @@ def _parser() -> "Parser":
 
 
 def _versions() -> str:
-    from protocol.extras import EXTRAS, is_installed  # noqa: PLC0415  # see `seventh_axis`
+    from protocol.program.extras import EXTRAS, is_installed  # noqa: PLC0415  # see `seventh_axis`
 
     extras = ", ".join(f"{extra} {'yes' if is_installed(extra) else 'no'}" for extra in EXTRAS)
     python = ".".join(map(str, sys.version_info[:3]))

@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from protocol.data_file import DataFileError
-from protocol.toml_table import TomlTable
+from protocol.files.data_file import DataFileError
+from protocol.files.toml_table import TomlTable
 
 FILE = Path("cell.toml")
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from protocol.extras import EXTRAS, missing_extra
+from protocol.program.extras import EXTRAS, missing_extra
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 DISTRIBUTIONS = {"xdist": "pytest-xdist"}
 """Where the module has another name than what installs it."""
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import field, fields, is_dataclass
 from typing import Any, TypeVar, get_type_hints
 
-from protocol.toml_table import TomlTable
+from protocol.files.toml_table import TomlTable
 
 _Section = TypeVar("_Section")
 

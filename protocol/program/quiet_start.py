@@ -37,8 +37,8 @@ def end_quietly(number: int, _: FrameType | None) -> None:
 
 def end_without_extra(kind: type[BaseException], error: BaseException, traceback: TracebackType | None) -> None:
     """End the program with one line if an import did not find a module of an extra; else print the traceback."""
-    from protocol.command_line import report_error  # noqa: PLC0415  # rarely needed, and the start should be fast
-    from protocol.extras import missing_extra  # noqa: PLC0415
+    from protocol.program.command_line import report_error  # noqa: PLC0415  # rarely needed, and the start should be fast
+    from protocol.program.extras import missing_extra  # noqa: PLC0415
 
     if sentence := missing_extra(error, _PROGRAM, *sys.argv[1:2]):
         command = [word for word in sys.argv[1:2] if _PROGRAM == _SCRIPT and not word.startswith("-")]

@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
-from protocol.color import colored
+from protocol.program.color import colored
 
 _names: dict[str, str] = {}
 """What a user types for each module; empty where that is `python -m MODULE`."""
@@ -74,7 +74,7 @@ class Parser(argparse.ArgumentParser):
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:  # noqa: ANN401  # as argparse has it
         """Refuse a value that is not one of the choices."""
-        from protocol.data_file import did_you_mean  # noqa: PLC0415  # rarely needed, and a start should be quick
+        from protocol.files.data_file import did_you_mean  # noqa: PLC0415  # rarely needed, and a start should be quick
 
         if action.choices is not None and value not in action.choices:
             names = [str(choice) for choice in action.choices]
@@ -87,7 +87,7 @@ class _Verbose(argparse.Action):
     """Begins at once: the option may stand before or after the name of a command."""
 
     def __call__(self, *_: object) -> None:
-        from protocol.verbose import log_to_stderr  # noqa: PLC0415  # rarely asked for, and a start should be quick
+        from protocol.program.verbose import log_to_stderr  # noqa: PLC0415  # rarely asked for, and a start should be quick
 
         log_to_stderr()
 

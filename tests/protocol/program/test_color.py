@@ -2,7 +2,7 @@ import io
 
 import pytest
 
-from protocol.color import colored
+from protocol.program.color import colored
 
 
 class Terminal(io.StringIO):

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from protocol.quiet_start import IS_PROGRAM, end_quietly
+from protocol.program.quiet_start import IS_PROGRAM, end_quietly
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 _Handler = Callable[[int, FrameType | None], object] | int | None

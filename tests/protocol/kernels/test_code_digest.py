@@ -12,7 +12,7 @@ import numba
 import numpy as np
 import pytest
 
-from protocol.code_digest import NoDigestError, code_digest
+from protocol.kernels.code_digest import NoDigestError, code_digest
 
 SIZES = '''"""Sizes."""
 from enum import IntEnum

@@ -4,9 +4,9 @@ from contextlib import suppress
 
 import pytest
 
-from protocol import interrupts
-from protocol.interrupts import ended_by_signals, said, signals_wait, status_after
-from protocol.quiet_start import program_run
+from protocol.program import interrupts
+from protocol.program.interrupts import ended_by_signals, said, signals_wait, status_after
+from protocol.program.quiet_start import program_run
 
 
 def test_an_interrupt_waits_until_the_block_is_done() -> None:

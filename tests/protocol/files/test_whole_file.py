@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from protocol.whole_file import whole_file, write_whole
+from protocol.files.whole_file import whole_file, write_whole
 
 
 def test_a_file_appears_under_its_name_when_it_is_whole(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@ import argparse
 
 import pytest
 
-from protocol.number_options import positive_number, whole_number
+from protocol.program.number_options import positive_number, whole_number
 
 
 @pytest.mark.parametrize("text", ["8", " 9 ", "360"])

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol.page import (
+from protocol.program.page import (
     Marked,
     Origin,
     counted,

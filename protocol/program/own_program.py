@@ -4,7 +4,7 @@ import os
 import sys
 from pathlib import Path
 
-_HOME = Path(__file__).resolve().parents[1]
+_HOME = Path(__file__).resolve().parents[2]
 """The folder of this project's packages."""
 
 

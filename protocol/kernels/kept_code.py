@@ -12,8 +12,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from protocol.code_digest import NoDigestError, code_digest
-from protocol.kept_file import KERNEL, cache_root, keep_file, load_file, made_by_one
+from protocol.kernels.code_digest import NoDigestError, code_digest
+from protocol.kernels.kept_file import KERNEL, cache_root, keep_file, load_file, made_by_one
 
 _LAYOUT = "3"
 """Raised when machine code is made or written in another way: code of a former layout is then never loaded."""

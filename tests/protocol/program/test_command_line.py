@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
-from protocol import command_line
-from protocol.command_line import Parser, call_programs, program_name, report, report_error, short_name
+from protocol.program import command_line
+from protocol.program.command_line import Parser, call_programs, program_name, report, report_error, short_name
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_only_an_error_is_colored(capsys: pytest.CaptureFixture[str], monkeypatc
 
 
 def test_a_message_that_nobody_reads_leaves_the_program_running() -> None:
-    program = "from protocol.command_line import report; report('tool', 'x' * 100_000); print('went on')"
+    program = "from protocol.program.command_line import report; report('tool', 'x' * 100_000); print('went on')"
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stderr is not None
         process.stderr.close()

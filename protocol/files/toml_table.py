@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from protocol.data_file import DataFileError, did_you_mean, read_toml, shortened, shown
+from protocol.files.data_file import DataFileError, did_you_mean, read_toml, shortened, shown
 
 
 class TomlTable:

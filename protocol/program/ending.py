@@ -5,8 +5,8 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 
-from protocol.command_line import report_error
-from protocol.interrupts import ended_by_signals, said, status_after
+from protocol.program.command_line import report_error
+from protocol.program.interrupts import ended_by_signals, said, status_after
 
 _BAD_INPUT = 2
 

@@ -6,7 +6,7 @@ The packages log through `logging`, each module under its own name, so that a pr
 import logging
 import sys
 
-from protocol.progress import show_line
+from protocol.program.progress import show_line
 
 _PACKAGES = ("emulator", "planner", "protocol", "tools")
 

@@ -24,8 +24,8 @@ from numba.core.datamodel.registry import register_default
 from numba.core.serialize import dumps
 from numba.extending import register_jitable
 
-from protocol.code_digest import NoDigestError, code_digest
-from protocol.kept_code import code_folder, code_name, compiled_by_one, keep_code, load_code
+from protocol.kernels.code_digest import NoDigestError, code_digest
+from protocol.kernels.kept_code import code_folder, code_name, compiled_by_one, keep_code, load_code
 
 _types: Any = numba.core.types
 _OPTIONS = {"error_model": "numpy", "nogil": True}

@@ -5,7 +5,7 @@ from html import escape
 from importlib.resources import files
 from typing import Literal, NamedTuple
 
-from protocol.software_version import software_version
+from protocol.program.software_version import software_version
 
 Kind = Literal["good", "bad"]
 
@@ -29,7 +29,7 @@ class Origin(NamedTuple):
 
 def page(title: str, blocks: Iterable[str], origin: Origin | None = None, style: str = "") -> str:
     """Return a page from blocks of HTML; `style` is additional CSS of this page."""
-    css = files("protocol").joinpath("page.css").read_text(encoding="utf-8") + style
+    css = files("protocol.program").joinpath("page.css").read_text(encoding="utf-8") + style
     body = "\n".join((f"<h1>{escape(title)}</h1>", *blocks, _footer(origin or Origin())))
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'

@@ -2,9 +2,9 @@ from dataclasses import dataclass
 
 import pytest
 
-from protocol.data_file import DataFileError
-from protocol.toml_section import quantity, section
-from protocol.toml_table import TomlTable
+from protocol.files.data_file import DataFileError
+from protocol.files.toml_section import quantity, section
+from protocol.files.toml_table import TomlTable
 
 
 @dataclass(frozen=True)

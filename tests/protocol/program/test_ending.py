@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from protocol.ending import ended
+from protocol.program.ending import ended
 
 
 def interrupted() -> int:
@@ -42,7 +42,9 @@ def test_an_error_that_was_not_expected_is_not_hidden() -> None:
         ended("tool", failing)
 
 
-PRINTING = "import sys; from protocol.ending import ended; sys.exit(ended('tool', lambda: print('x' * 100_000) or 0))"
+PRINTING = (
+    "import sys; from protocol.program.ending import ended; sys.exit(ended('tool', lambda: print('x' * 100_000) or 0))"
+)
 
 
 def test_a_reader_that_has_gone_is_one_line_and_status_2() -> None:
@@ -69,7 +71,7 @@ def test_results_for_which_there_is_no_room_are_one_line_and_status_2() -> None:
 INTERRUPTED_RUN = """
 import os, signal, sys, threading
 from emulator.config.table_config import load_config
-from protocol.ending import ended
+from protocol.program.ending import ended
 from tools.emulated import Motion, emulate
 
 config = load_config()

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from protocol import kept_file
-from protocol.kept_file import KERNEL, UNUSED_DAYS, cache_root, keep_file, load_file, made_by_one, prune
+from protocol.kernels import kept_file
+from protocol.kernels.kept_file import KERNEL, UNUSED_DAYS, cache_root, keep_file, load_file, made_by_one, prune
 
 
 @pytest.fixture

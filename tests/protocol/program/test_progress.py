@@ -1,6 +1,6 @@
 import io
 
-from protocol.progress import progress_line
+from protocol.program.progress import progress_line
 
 
 class Terminal(io.StringIO):

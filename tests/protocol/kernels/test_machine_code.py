@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from protocol import kept_file
+from protocol.kernels import kept_file
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 PARTS = """
 from typing import NamedTuple
@@ -28,7 +28,7 @@ WHOLE = """
 from numba.core import event
 from parts import Pair, added
 from planner.kernel import kernel
-from protocol.machine_code import compiled
+from protocol.kernels.machine_code import compiled
 
 added = kernel(added)
 
@@ -184,7 +184,7 @@ LISTING = """
 import importlib, pkgutil, sys
 import planner
 from planner.kernel import _Kernel
-from protocol.kept_code import code_name
+from protocol.kernels.kept_code import code_name
 for module in pkgutil.walk_packages(planner.__path__, "planner."):
     if not module.name.endswith("__main__"):
         for name, value in sorted(vars(importlib.import_module(module.name)).items()):

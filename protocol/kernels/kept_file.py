@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
-from protocol.whole_file import whole_file
+from protocol.files.whole_file import whole_file
 
 if sys.platform != "win32":  # there, several processes may make the same
     import fcntl

@@ -6,7 +6,7 @@ NO_COLOR switches it off, FORCE_COLOR on also in pipes, as in Python's own messa
 import os
 from typing import Literal, TextIO
 
-from protocol.progress import shows_progress
+from protocol.program.progress import shows_progress
 
 Kind = Literal["good", "bad"]
 

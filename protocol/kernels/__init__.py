@@ -1,0 +1,1 @@
+"""Machine code of numerical kernels, kept between runs."""

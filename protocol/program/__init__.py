@@ -1,0 +1,1 @@
+"""What all programs of this project have in common: command line, messages, progress, signals, pages."""
