@@ -176,7 +176,7 @@ def run_lockstep(config: TableConfig, ticks: int, seed: int, firmware: Path | No
             pair.step()
         pair.compare()
         done.ticks += pair.emulated.tick - begun
-        done.longest_tick = max(done.longest_tick, pair.compiled.chip.longest_tick)  # a power cycle begins anew
+        done.longest_tick = max(done.longest_tick, pair.compiled.chip.longest_tick)  # a power cycle resets it
     return done
 
 
