@@ -113,12 +113,12 @@ def _replayable(record_file: Path) -> list[str]:
     record, profile = read_record(record_file), compiled_profile()
     options = []
     is_latch_another = False
-    for case in record.cases:
+    for case in (case for case in record.cases if case.wire):
         is_open = isinstance(check((case,), record.home_deg, profile), Misfit)
         triggers = any(event.direction == "beside" for event in case.wire)
         if is_open or case.id in _FLOODS or (is_latch_another and _reads_latch_first(case)):
             is_latch_another |= triggers
-        elif case.wire:
+        else:
             is_latch_another &= not triggers
             options.append(f"--case={case.id}$")
     return options
