@@ -7,17 +7,21 @@ import numpy as np
 
 from planner.arrays import FloatArray
 from planner.defaults import TOLERANCE_DEG
+from planner.execution.clear_path import is_clear
 from planner.execution.dead_line import DeadLine, judge_dead_line
 from planner.execution.run_input import RunInput
 from planner.execution.run_record import Observation, Record
-from planner.execution.table_motion import Phase, TableMotion
+from planner.execution.table_motion import Leg, Phase, TableMotion
 from planner.map.config_map import ConfigurationMap
 from planner.plans.crossing import crossing_is_allowed
 from planner.plans.plan import path_cost
+from planner.plans.problem import Problem
 from planner.table.cost import PathCost
 
 # A latch with a larger deviation from the plan belongs to an earlier trigger.
 _STALE_DEG = 1.0
+# In these legs the probe is retracted, or moves to or from the workpiece by the robot's own program.
+_WITHOUT_PROBE = frozenset({Phase.RETRACT, Phase.ROTATE, Phase.APPROACH})
 
 
 class Deviation(NamedTuple):
@@ -38,7 +42,7 @@ class RunVerification(NamedTuple):
             as far as known. The reference is compared with the commanded plan, which is ahead by the lead.
         located_deg: (n + 1,) the encoder angle at each location, NaN if unknown.
         missing_triggers: locations without their own latch.
-        forbidden_steps: steps in which the executed path touched a forbidden cell.
+        forbidden_steps: steps in which the executed path touched a forbidden cell, with waits and the stop.
         margin_deg: minimum distance of the executed path from a forbidden cell over all locations; infinity if nothing
             is forbidden, NaN if no location is known.
         planned_cost: Eq. (7) of the plan.
@@ -201,16 +205,26 @@ def _missing(latches: _Series | None, count: int) -> tuple[int, ...]:
 
 
 def _forbidden_steps(run_input: RunInput, motion: TableMotion, series: Sequence[_Series]) -> tuple[int, ...]:
-    """Return the scan steps in which one of the series touched a forbidden cell; pauses do not count."""
-    runs, touched = run_input.problem.terms.runs, set()
+    """Return the scan steps in which one of the series touched a forbidden cell; pauses do not count.
+
+    A wait or the stop at a location counts to the step after it, at the last location to the step before it.
+    """
+    last, touched = len(run_input.plan.accelerations_deg_s2) - 1, set()
     for leg in motion.legs:
-        if leg.phase is not Phase.SCAN:
+        if leg.phase in _WITHOUT_PROBE:
             continue
         for each in series:
             inside = each.angles_deg[(each.times_s >= leg.start_s) & (each.times_s <= leg.end_s)]
-            if len(inside) and not crossing_is_allowed(runs, leg.column, float(inside.min()), float(inside.max())):
-                touched.add(leg.column)
+            if len(inside) and not _is_allowed(run_input.problem, leg, float(inside.min()), float(inside.max())):
+                touched.add(min(leg.column, last))
     return tuple(sorted(touched))
+
+
+def _is_allowed(problem: Problem, leg: Leg, lowest_deg: float, highest_deg: float) -> bool:
+    """Return whether the table may be at the angles of an interval during a leg."""
+    if leg.phase is Phase.SCAN:
+        return bool(crossing_is_allowed(problem.terms.runs, leg.column, lowest_deg, highest_deg))
+    return is_clear(problem.map, leg.column, lowest_deg, highest_deg)
 
 
 def _margin_deg(configuration_map: ConfigurationMap, located_deg: FloatArray) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from planner.map.config_map import column_value
 from planner.plans.crossing import halt_is_allowed, step_is_allowed
 from planner.plans.plan import Plan
-from planner.plans.problem import Problem
+from planner.plans.problem import Problem, Terms
 
 # Speeds and accelerations result from sums: an excess of this size over a limit is rounding.
 ROUNDING = 1e-9
@@ -17,7 +17,8 @@ class Verification(NamedTuple):
     """The result of the check of a plan.
 
     Attributes:
-        forbidden_steps: steps that touch a forbidden region at their end or before it.
+        forbidden_steps: steps that touch a forbidden region at their end or before it, or in a wait before them; a
+            wait at the last location counts to the last step.
         clearance_deg: minimum distance from a forbidden sample, along the angle axis, over all locations; infinity if
             no location has any.
         speed_margin_deg_s: margin to the speed limit; negative if it is exceeded.
@@ -62,10 +63,15 @@ def _forbidden_steps(problem: Problem, plan: Plan) -> tuple[int, ...]:
         else:
             state = plan.angles_deg[k], 0.0 if k in waiting else plan.speeds_deg_s[k], acceleration
             is_allowed = step_is_allowed(terms.runs, k, *state, terms.step_s)
-        if k in waiting:
-            speed = plan.speeds_deg_s[k]
-            way_deg = 0.5 * speed * abs(speed) / terms.acceleration_limit_deg_s2
-            is_allowed &= halt_is_allowed(terms.values, terms.epsilon, k, plan.angles_deg[k], way_deg, 0.0)
         if not is_allowed:
             forbidden.append(k)
-    return tuple(forbidden)
+    last = len(plan.accelerations_deg_s2) - 1
+    halts = (min(location, last) for location in waiting if not _may_halt(terms, plan, location))
+    return tuple(sorted({*forbidden, *halts}))
+
+
+def _may_halt(terms: Terms, plan: Plan, location: int) -> bool:
+    """Return whether the table may come to rest at the angle of a location, which it passes."""
+    speed = plan.speeds_deg_s[location]
+    way_deg = 0.5 * speed * abs(speed) / terms.acceleration_limit_deg_s2
+    return bool(halt_is_allowed(terms.values, terms.epsilon, location, plan.angles_deg[location], way_deg, 0.0))

@@ -8,7 +8,9 @@ import pytest
 from planner.execution.run_input import RunInput
 from planner.execution.run_record import Observation, Record
 from planner.execution.run_verification import RunVerification, verify_run
+from planner.execution.table_motion import Phase
 from planner.map.config_map import ConfigurationMap
+from planner.plans.plan import Wait
 from tests.planner.run_examples import short_run_input
 
 
@@ -130,3 +132,36 @@ def test_commands_sent_ahead_make_the_reference_early_and_the_encoder_less_late(
     assert deviations["reference"].anywhere_deg == pytest.approx(0.0, abs=1e-9)
     expected = abs(lead_s - lag_s) * float(np.abs(speeds).max())
     assert deviations["encoder"].anywhere_deg == pytest.approx(expected, rel=0.2, abs=0.01)
+
+
+@pytest.mark.parametrize("location", [7, -1])
+def test_a_forbidden_cell_that_is_touched_in_a_wait_is_reported(run_input: RunInput, location: int) -> None:
+    """A table that halts passes its angle and comes back while the probe is at the location."""
+    at = range(len(run_input.plan.angles_deg))[location]
+    waiting = replace(run_input, plan=replace(run_input.plan, waits=(Wait(at, 2.0),)))
+    motion = waiting.motion()
+    leg = next(leg for leg in motion.legs if leg.phase is Phase.WAIT)
+    blocked, angle_deg = waiting.problem.map.values.copy(), float(run_input.plan.angles_deg[at])
+    sample = 2 + round(angle_deg / waiting.problem.map.angle_step_deg)
+    beyond_deg = sample * waiting.problem.map.angle_step_deg
+    blocked[at, sample % blocked.shape[1]] = 0.0
+    problem = replace(waiting.problem, map=ConfigurationMap(blocked))
+    seen = [
+        Observation(leg.start_s + share * leg.duration_s, "H", angle)
+        for share, angle in ((0.3, angle_deg), (0.5, beyond_deg), (0.7, angle_deg))
+    ]
+    result = verify_run(replace(waiting, problem=problem), motion, Record(observations=seen), lead_s=0.0)
+    assert result.forbidden_steps == (min(at, len(run_input.plan.accelerations_deg_s2) - 1),)
+    assert not result.is_verified
+
+
+def test_a_stop_that_passes_into_a_forbidden_cell_is_reported(run_input: RunInput) -> None:
+    motion, last = run_input.motion(), len(run_input.plan.angles_deg) - 1
+    beside_deg = checked(run_input, 0.0).margin_deg
+    seen = [
+        Observation(motion.column_time_s(last) + 0.1, "H", float(run_input.plan.angles_deg[last]) + sign * off_deg)
+        for sign in (-1.0, 1.0)
+        for off_deg in np.arange(0.0, 180.0, max(1.0, 0.5 * beside_deg))
+    ]
+    result = verify_run(run_input, motion, Record(observations=seen), lead_s=0.0)
+    assert result.forbidden_steps == (last - 1,)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -5,7 +7,7 @@ from planner.defaults import DEFAULT_PLANNER
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, synthetic_map
 from planner.planning.planners import PLANNERS
-from planner.plans.plan import Pause, Plan, make_plan
+from planner.plans.plan import Pause, Plan, Wait, make_plan
 from planner.plans.problem import Problem
 from planner.plans.verification import verify
 from planner.table.motion import Limits, roll_out
@@ -43,6 +45,19 @@ def test_a_pause_may_turn_through_forbidden_angles_but_not_end_there() -> None:
     assert verify(problem, paused).is_executable
     blocked = make_plan(problem, "test", np.zeros(3), np.zeros(3), np.zeros(2), [Pause(0, 0.0, 0.0)])
     assert verify(problem, blocked).forbidden_steps == (0, 1)
+
+
+@pytest.mark.parametrize("location", [0, 1, 2])
+def test_a_halt_that_passes_its_angle_into_an_obstacle_is_found_at_every_location(location: int) -> None:
+    values, limits = np.ones((3, 36)), Limits(40.0, 20.0)
+    problem = Problem(ConfigurationMap(values.copy()), step_s=1.0, limits=limits)
+    plan = make_plan(problem, "test", np.array([0.0, 40.0, 80.0]), np.full(3, 40.0), np.zeros(2))
+    halted = replace(plan, waits=(Wait(location, 5.0),))
+    assert verify(problem, halted).forbidden_steps == ()
+    # From 40 deg/s at 20 deg/s2 the table passes the angle by 40 deg.
+    values[location, 4 * location + 3] = 0.0
+    blocked = Problem(ConfigurationMap(values), step_s=1.0, limits=limits)
+    assert verify(blocked, halted).forbidden_steps == (min(location, 1),)
 
 
 @pytest.mark.parametrize("name", [name for name in PLANNERS if name != "local_maxima"])
