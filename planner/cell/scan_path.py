@@ -2,6 +2,7 @@
 
 import csv
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from planner.errors import PathError
 from planner.geometry.transforms import first_not_rigid, from_xyz_yaw_pitch_roll, nearest_rigid
 from protocol.files.data_file import DataFileError, read_json, read_text, shown
 
+_ROWS = 4  # of a matrix
 MOST_LOCATIONS = 20_000
 """More than any useful path: a day at one location every 4 s."""
 
@@ -147,10 +149,26 @@ def _rows_of_json(file: Path) -> list[list[float]]:
     poses = read_json(file)
     if not isinstance(poses, list):
         raise PathError(f"{file}: must hold a list of poses")
+    rows = [numbers_of(one) for one in poses]
+    if None in rows:
+        raise PathError(
+            f"{file}: pose {rows.index(None) + 1} must be a list of 6 numbers, or a 4 x 4 matrix of numbers"
+        )
+    return [row for row in rows if row is not None]
+
+
+def numbers_of(pose: object) -> list[float] | None:
+    """Return the numbers of a pose read from JSON, a list of them or four rows of four; None for anything else."""
+    if not isinstance(pose, list):
+        return None
+    is_matrix = len(pose) == _ROWS and all(isinstance(row, list) and len(row) == _ROWS for row in pose)
+    numbers = list(chain.from_iterable(pose)) if is_matrix else pose
+    if not all(isinstance(each, int | float) and not isinstance(each, bool) for each in numbers):
+        return None
     try:
-        return [np.asarray(one, dtype=np.float64).ravel().tolist() for one in poses]
-    except (TypeError, ValueError, OverflowError):
-        raise PathError(f"{file}: each pose must be 6 numbers, or a 4 x 4 matrix of numbers") from None
+        return [float(each) for each in numbers]
+    except OverflowError:  # an integer of hundreds of digits
+        return None
 
 
 def pose_of(where: str, row: list[float]) -> FloatArray:

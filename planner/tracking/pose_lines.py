@@ -13,7 +13,7 @@ from collections import deque
 import numpy as np
 
 from planner.arrays import FloatArray
-from planner.cell.scan_path import pose_of
+from planner.cell.scan_path import numbers_of, pose_of
 from planner.errors import PathError
 from protocol.files.data_file import shown
 
@@ -92,16 +92,17 @@ class PoseLines:
         if set(sent) != {"location", "pose"}:
             raise SourceError(f"{where} holds {shown(text)}; {_ALLOWED}")
         number = sent["location"]
-        if number != self._count or isinstance(number, bool):
-            what = "repeats a location" if isinstance(number, int) and number < self._count else "leaves locations out"
-            raise SourceError(f"{where} {what}: its number is {shown(str(number))}; the next is {self._count}")
+        if not isinstance(number, int) or isinstance(number, bool) or number < 0:
+            raise SourceError(f"{where} holds {shown(text)}; a location is a whole number, counted from 0")
+        if number != self._count:
+            what = "repeats a location" if number < self._count else "leaves locations out"
+            raise SourceError(f"{where} {what}: its number is {shown(number)}; the next is {self._count}")
         return sent["pose"]
 
     def _add(self, where: str, text: str, sent: object) -> None:
-        try:
-            row = np.asarray(sent, dtype=np.float64).ravel().tolist()
-        except (TypeError, ValueError, OverflowError):
-            raise SourceError(f"{where} holds {shown(text)}; {_ALLOWED}") from None
+        row = numbers_of(sent)
+        if row is None:
+            raise SourceError(f"{where} holds {shown(text)}; {_ALLOWED}")
         try:
             T_WS = pose_of(f"{where}:", row)
         except PathError as error:

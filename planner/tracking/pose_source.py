@@ -65,8 +65,8 @@ class ProgramSource:
 
     @property
     def has_ended(self) -> bool:
-        """Whether all locations were taken, and the end marker came."""
-        return self._lines.has_ended and not self._lines.poses
+        """Whether all locations were taken, and the end marker came with nothing behind it."""
+        return self._lines.has_ended and not self._lines.poses and self._fault is None
 
     def take(self, room: int, wait_s: float = 0.0) -> list[FloatArray]:
         """Return what has come, see `PoseSource`; what came before a fault comes first."""
@@ -112,7 +112,7 @@ def program_source(name: str, say: Callable[[str], None], wait_s: float) -> Iter
         SourceError: it cannot be opened, or nobody connects.
     """
     if name == STDIN:
-        yield ProgramSource(sys.stdin.fileno(), "stdin")
+        yield ProgramSource(_stdin(), "stdin")
         return
     host, _, port = name.removeprefix(_TCP).rpartition(":")
     if host not in _LOOPBACK or not port.isdecimal() or int(port) > 65535:
@@ -121,12 +121,19 @@ def program_source(name: str, say: Callable[[str], None], wait_s: float) -> Iter
         server = socket.create_server((_LOOPBACK[0], int(port)))
     except OSError as error:
         raise SourceError(f"poses: {name} cannot be opened ({error.strerror or error}); take another port") from error
-    with server:
+    with server:  # closed after the first program, so that a second one is refused
         server.settimeout(wait_s)
         say(f"waiting for poses at {_TCP}{_LOOPBACK[0]}:{server.getsockname()[1]}")
         try:
             client, _ = server.accept()
         except TimeoutError:
             raise SourceError(f"poses: no program connected within {wait_s:g} s") from None
-        with client:
-            yield ProgramSource(client.fileno(), name)
+    with client:
+        yield ProgramSource(client.fileno(), name)
+
+
+def _stdin() -> int:
+    try:
+        return sys.stdin.fileno()
+    except (AttributeError, OSError, ValueError):  # a program may be started without it, or with it closed
+        raise SourceError("poses: stdin is closed; connect a program to it, or use tcp://127.0.0.1:PORT") from None

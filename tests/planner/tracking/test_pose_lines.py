@@ -31,11 +31,27 @@ def test_poses_come_whole_however_the_bytes_are_cut(cuts: list[int]) -> None:
         ("[1, 2, 3, 4, 5, NaN]", "line 1: holds a value that is not a finite number"),
         ("[1, 2, 3, 4, 5, Infinity]", "line 1: holds a value that is not a finite number"),
         ("[1, 2, 3, 4, 5, \"x\"]", "line 1 holds"),
-        ("null", "line 1"),
-        ("7", "line 1"),
+        ("null", "line 1 holds 'null'; send"),
+        ("7", "line 1 holds '7'; send"),
+        ("true", "line 1 holds 'true'; send"),
+        ('["1", "2", "3", "4", "5", "6"]', "line 1 holds"),
+        ("[true, false, 3, 4, 5, 6]", "line 1 holds"),
+        ("[1, 2, 3, 4, 5, null]", "line 1 holds"),
+        ("[[1, 2, 3, 4, 5, 6]]", "line 1 holds"),
+        ("[[1, 2, 3], [4, 5, 6]]", "line 1 holds"),
+        ("[[[1, 2, 3, 4, 5, 6]]]", "line 1 holds"),
+        ("[[1, 0, 0, 0, 0, 1, 0, 0], [0, 0, 1, 0, 0, 0, 0, 1]]", "line 1 holds"),
+        (f"[1, 2, 3, 4, 5, {10**400}]", "line 1 holds"),
+        ("[]", "line 1: has 0 numbers; allowed are 6"),
+        ('{"location": 0, "pose": "end"}', "line 1 holds"),
+        ('{"location": 0, "pose": {"x": 1}}', "line 1 holds"),
+        ('{"location": "0", "pose": [1, 2, 3, 4, 5, 6]}', "line 1 holds"),
+        ('{"location": 0.0, "pose": [1, 2, 3, 4, 5, 6]}', "line 1 holds"),
+        ('{"location": null, "pose": [1, 2, 3, 4, 5, 6]}', "line 1 holds"),
+        ('{"location": -1, "pose": [1, 2, 3, 4, 5, 6]}', "line 1 holds"),
         ('"END"', "line 1 holds"),
         ('{"pose": [1, 2, 3, 4, 5, 6]}', "line 1 holds"),
-        ('{"location": 3, "pose": [1, 2, 3, 4, 5, 6]}', "line 1 leaves locations out: its number is '3'; the"),
+        ('{"location": 3, "pose": [1, 2, 3, 4, 5, 6]}', "line 1 leaves locations out: its number is 3; the"),
         ('{"location": true, "pose": [1, 2, 3, 4, 5, 6]}', "line 1"),
         ("[2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]", "line 1:"),
         ("[1e30, 2, 3, 4, 5, 6]", "line 1 is 1e+30 mm from the workpiece; allowed are 10000"),
@@ -55,7 +71,7 @@ def test_a_number_that_was_sent_already_repeats() -> None:
     reader = PoseLines("poses")
     one = json.dumps({"location": 0, "pose": [1, 2, 3, 4, 5, 6]}).encode() + b"\n"
     reader.feed(one)
-    with pytest.raises(SourceError, match="line 2 repeats a location: its number is '0'; the next is 1"):
+    with pytest.raises(SourceError, match="line 2 repeats a location: its number is 0; the next is 1"):
         reader.feed(one)
 
 
@@ -70,3 +86,32 @@ def test_a_stream_that_ends_without_its_marker_is_a_program_that_died() -> None:
     reader.feed(b"[1,2,3,4,5,6]\n")
     with pytest.raises(SourceError, match=r'ended without the line "end", at 1 locations'):
         reader.close()
+
+
+def test_a_matrix_is_its_sixteen_numbers_or_its_four_rows() -> None:
+    reader, matrix = PoseLines("poses"), locations(2)
+    reader.feed((json.dumps(matrix[0].ravel().tolist()) + "\r\n" + json.dumps(matrix[1].tolist()) + "\r\n").encode())
+    np.testing.assert_allclose(np.array(reader.poses), matrix, atol=1e-9)
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=7) | st.dictionaries(st.sampled_from(["location", "pose", "x"]), inner),
+    max_leaves=20,
+)
+
+
+@given(json_values | st.dictionaries(st.just("location"), json_values).map(lambda one: one | {"pose": [1.0] * 6}))
+def test_any_other_json_is_refused_in_one_line_or_is_a_pose_of_numbers(value: object) -> None:
+    reader, message = PoseLines("poses"), ""
+    try:
+        reader.feed(json.dumps(value).encode() + b"\n")
+    except SourceError as error:
+        message = str(error)
+    if message:
+        assert message.startswith("poses: line 1")
+        assert "\n" not in message
+        assert len(message) < 400
+        return
+    pose = value["pose"] if isinstance(value, dict) else value
+    assert value == "end" or (isinstance(pose, list) and {type(number) for number in pose} <= {int, float})
