@@ -52,6 +52,7 @@ class LiveCommands:
         self._tracker, self._source, self._observer = tracker, source, observer
         self._now_s, self._wait_s, self._is_real_time = now_s, wait_s, is_real_time
         self._waiting_since_s: float | None = None
+        self._has_failed = False
 
     @property
     def corrections(self) -> list[Correction]:
@@ -88,37 +89,44 @@ class LiveCommands:
     def _take_locations(self) -> None:
         """Reveal what has come; a source that fails lets the table come to rest."""
         room = min(self._tracker.room, _COLUMNS_A_STEP)
-        if not room:
+        if not room or self._has_failed:
             return
         try:
-            for T_WS in self._source.take(room, 0.0 if self._is_real_time else self._wait_s):
-                column = self._tracker.reveal(T_WS)
-                if column is not None:
-                    self._observer.revealed(column)
+            poses = self._source.take(room, 0.0 if self._is_real_time else self._wait_s)
         except SourceError as error:
-            self._tracker.abandon(error)
+            self._abandon(error)
             return
+        for T_WS in poses:
+            column = self._tracker.reveal(T_WS)
+            if column is not None:
+                self._observer.revealed(column)
         if self._source.has_ended:
             self._tracker.end()
+        elif poses:
+            self._waiting_since_s = None
+        elif not self._is_real_time:
+            self._abandon(self._nothing_came())
 
     def _watch_the_wait(self, tracked: Tracked) -> None:
-        """End a scan that has waited too long for a location."""
-        step = tracked.step
-        if step is None:
-            return
-        if step.why is not Why.NO_LOCATION:
-            self._waiting_since_s = None
+        """End a scan that waits at rest, and to which no location has come for too long."""
+        if tracked.step is None or tracked.step.why is not Why.NO_LOCATION:
             return
         now_s = tracked.command.time_s
         if self._waiting_since_s is None:
             self._waiting_since_s = now_s
-        elif now_s - self._waiting_since_s > self._wait_s or not self._is_real_time:
-            self._tracker.abandon(
-                SourceError(
-                    f"poses: no location came for {self._wait_s:g} s after location {step.last_known};"
-                    ' send "end" after the last one'
-                )
-            )
+        elif now_s - self._waiting_since_s > self._wait_s:
+            self._abandon(self._nothing_came())
+
+    def _abandon(self, error: SourceError) -> None:
+        """Come to rest, and take no more locations."""
+        self._has_failed = True
+        self._tracker.abandon(error)
+
+    def _nothing_came(self) -> SourceError:
+        return SourceError(
+            f"poses: no location came for {self._wait_s:g} s after location {self._tracker.count - 1};"
+            ' send "end" after the last one'
+        )
 
 
 def reveal_first_view(

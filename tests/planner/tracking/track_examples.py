@@ -62,12 +62,12 @@ def new_tracker(view: int = 8, step_s: float | None = None, arm: Arm | None = No
     )
 
 
-def begun_tracker(T_WS: FloatArray, view: int = 8, arm: Arm | None = None) -> Tracker:
-    """Return a tracker that rests at the start and has its first view."""
+def begun_tracker(T_WS: FloatArray, view: int = 8, arm: Arm | None = None, ends: bool = True) -> Tracker:
+    """Return a tracker that rests at the start and has its first view; with all in view, the path ends or goes on."""
     tracker = new_tracker(view, arm=arm)
     for T in T_WS[: tracker.room]:
         tracker.reveal(T)
-    if tracker.count == len(T_WS):
+    if ends and tracker.count == len(T_WS):
         tracker.end()
     tracker.begin(tracker.choose_start())
     return tracker
