@@ -80,6 +80,11 @@ class Grid:
                 f" with {wire.decimals} decimals both must be at least {self.quantum:g}"
             )
 
+    @property
+    def limits(self) -> Limits:
+        """The largest S and A that can be sent."""
+        return Limits(self._number(self._most_speed), self._number(self._most_rate))
+
     def nearest(self, value: float) -> float:
         """Return the nearest number to a value."""
         return self._number(round(value / self.quantum))

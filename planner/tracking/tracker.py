@@ -25,7 +25,7 @@ from planner.map.config_map import DEFAULT_EPSILON
 from planner.map.map_problem import MapProblem
 from planner.table.cost import Weights
 from planner.table.motion import Limits
-from planner.table.wire import StreamError, Wire, exchanges_s
+from planner.table.wire import Grid, StreamError, Wire, exchanges_s
 from planner.tracking.decision import METHODS, costs_of_starts
 from planner.tracking.followed_arm import FollowedArm
 from planner.tracking.growing_motion import GrowingMotion
@@ -181,7 +181,7 @@ class Tracker(FollowedReference):
             angle_count: table angles of a column.
 
         Raises:
-            StreamError: a step is too short for the commands of a step.
+            StreamError: a step is too short for the commands of a step, or a limit is too small to be sent.
             TrackError: the planner is none that decides step by step.
         """
         self._settings, self._wire = settings or TrackSettings(), wire or Wire()
@@ -191,6 +191,8 @@ class Tracker(FollowedReference):
         if self._settings.planner not in METHODS:
             raise TrackError(f"the planner is {self._settings.planner}; allowed are {', '.join(METHODS)}")
         self._problem, self._step_s, self._limits, self._weights = problem, step_s, limits, weights
+        # A table that brakes at its limit brakes at the A that can be sent.
+        self._sent_limits = Grid(limits, self._wire).limits
         self._angle_count = angle_count
         self._times_of_lines: dict[float, tuple[float, float]] = {}
         self._check_the_step_fits()
@@ -474,7 +476,9 @@ class Tracker(FollowedReference):
     def _revealed(self, rater: ColumnRater, first: int) -> tuple[RevealedMap, tuple[Column, ...]]:
         """Return the known columns in one configuration."""
         values, reasons = rater.rate(np.stack([each.goal for each in self._known]), first)
-        revealed = RevealedMap(self._angle_count, self._step_s, self._limits, self._weights, self._settings.view, first)
+        revealed = RevealedMap(
+            self._angle_count, self._step_s, self._sent_limits, self._weights, self._settings.view, first
+        )
         for column in values[0]:
             revealed.reveal(column)
         columns = zip(self._known, values[0], reasons[0], strict=True)
@@ -499,7 +503,7 @@ class Tracker(FollowedReference):
 
     def _start_in(self, c: int, values: FloatArray, reasons: CodeArray) -> tuple[float, Start] | None:
         """Return the cost of the best start in a configuration, and the start; None where there is none."""
-        revealed = RevealedMap(self._angle_count, self._step_s, self._limits, self._weights, self._settings.view)
+        revealed = RevealedMap(self._angle_count, self._step_s, self._sent_limits, self._weights, self._settings.view)
         for column in values:
             revealed.reveal(column)
         window = revealed.window(0)

@@ -18,6 +18,7 @@ from planner.execution.table_motion import Phase
 from planner.kinematics.arm import Arm
 from planner.kinematics.joint_limits import first_joint_fault
 from planner.kinematics.value import RatedPoses, UserFactor
+from planner.table.motion import Limits
 from planner.table.wire import StreamError
 from planner.tracking.online_planner import Kind, Step, Why
 from planner.tracking.pose_lines import SourceError
@@ -109,6 +110,16 @@ def test_a_decision_that_is_late_is_not_taken_and_counted() -> None:
     assert late.step is not None
     assert late.step.why is Why.NOT_IN_TIME
     assert tracker.missed == 1
+
+
+def test_no_step_and_no_way_to_rest_needs_more_than_the_protocol_can_send() -> None:
+    """Of 0.39 deg/s2, with one decimal 0.3 can be sent: a table that brakes at its limit needs a third more."""
+    path = locations()
+    tracker = begun_tracker(path, limits=Limits(30.04, 0.39))
+    steps = steps_to_the_end(tracker, path)
+    rates = [abs(step.acceleration_deg_s2) for step in steps]
+    rates += [abs(kept.acceleration_deg_s2) for step in steps for kept in step.kept]
+    assert 0.25 < max(rates) <= 0.3 + 1e-9
 
 
 def test_when_the_source_dies_the_table_comes_to_rest_before_the_fault_is_raised() -> None:

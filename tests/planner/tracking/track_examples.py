@@ -13,6 +13,7 @@ from planner.defaults import SCANS
 from planner.kinematics.arm import Arm
 from planner.kinematics.configuration import Configuration
 from planner.map.map_problem import map_problem
+from planner.table.motion import Limits
 from planner.table.wire import Wire
 from planner.tracking.online_planner import Step
 from planner.tracking.tracker import Tracked, Tracker, TrackSettings
@@ -51,20 +52,31 @@ def write_scan(folder: Path, step_s: float = 0.5) -> Path:
     return file
 
 
-def new_tracker(view: int = 8, step_s: float | None = None, arm: Arm | None = None) -> Tracker:
+def new_tracker(
+    view: int = 8, step_s: float | None = None, arm: Arm | None = None, limits: Limits | None = None
+) -> Tracker:
     """Return a tracker of the cylinder in one configuration, on a coarse map."""
     scan, problem = cylinder(), map_problem(cylinder())
     if arm is not None:
         problem = replace(problem, cell=replace(problem.cell, arm=arm))
     settings = TrackSettings(view=view)
     return Tracker(
-        problem, step_s or scan.path.step_s, scan.limits, scan.weights, Wire(), settings, [CONFIGURATION], ANGLES
+        problem,
+        step_s or scan.path.step_s,
+        limits or scan.limits,
+        scan.weights,
+        Wire(),
+        settings,
+        [CONFIGURATION],
+        ANGLES,
     )
 
 
-def begun_tracker(T_WS: FloatArray, view: int = 8, arm: Arm | None = None, ends: bool = True) -> Tracker:
+def begun_tracker(
+    T_WS: FloatArray, view: int = 8, arm: Arm | None = None, ends: bool = True, limits: Limits | None = None
+) -> Tracker:
     """Return a tracker that rests at the start and has its first view; with all in view, the path ends or goes on."""
-    tracker = new_tracker(view, arm=arm)
+    tracker = new_tracker(view, arm=arm, limits=limits)
     for T in T_WS[: tracker.room]:
         tracker.reveal(T)
     if ends and tracker.count == len(T_WS):
