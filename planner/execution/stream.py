@@ -33,16 +33,22 @@ class TimedCommand(NamedTuple):
         leg: the leg that it belongs to.
         command: target, S and A, as transmitted.
         expected: the predicted reference at that time.
+        chosen: the command before it got a target that serves until the next one; None where it is the same.
     """
 
     time_s: float
     leg: Leg
     command: MotionCommand
     expected: ReferenceState
+    chosen: MotionCommand | None = None
 
     def reference_at(self, time_s: float) -> ReferenceState:
         """Return the position of the reference at a time from then on, until the next command."""
         return advance(self.expected, self.command, time_s - self.time_s)
+
+    def going_on_at(self, time_s: float) -> ReferenceState:
+        """Return the same without the braking for a target that the next command replaces before it brakes."""
+        return advance(self.expected, self.chosen or self.command, time_s - self.time_s)
 
 
 def stream(motion: TableMotion, limits: Limits, wire: Wire, run_on_deg: float = RUN_ON_DEG) -> tuple[TimedCommand, ...]:
@@ -106,7 +112,8 @@ class Encoder:
 
         Args:
             running: the command before it, as it took effect; None at the start.
-            before: the reference at a time without a new command.
+            before: the reference at a time without a new command, and without the braking before it; see
+                `TimedCommand.going_on_at`.
             piece: the piece for the command.
             first_s: the time of the command, if it is given.
         """
@@ -143,7 +150,8 @@ class Encoder:
         """Return a command with a target that is sufficient until the next command."""
         late_s = latest_s(timed.leg.duration_s)
         choice = Choice(timed.time_s, timed.command)
-        return timed._replace(command=with_target(choice, timed.expected, next_s, late_s, self._grid))
+        command = with_target(choice, timed.expected, next_s, late_s, self._grid)
+        return timed._replace(command=command, chosen=timed.command)
 
 
 class Streaming:
@@ -174,7 +182,7 @@ class Streaming:
         """Yield a command for each piece once the time of the next one is known, because its target depends on that."""
         pending: TimedCommand | None = None
         for piece in pieces:
-            before = standing_at(start) if running is None else running.reference_at
+            before = standing_at(start) if running is None else running.going_on_at
             choice = self._encoder.choice(running, before, piece, first_s)
             if pending is not None:
                 yield self._encoder.aimed(pending, choice.time_s)

@@ -373,7 +373,7 @@ class Tracker(FollowedReference):
         moved_deg = self.moved_by_drift()
         if moved_deg:
             self.corrections.append(Correction(piece.start_s, moved_deg))
-        before = standing_at(self._encoder.start) if self.running is None else self.running.reference_at
+        before = standing_at(self._encoder.start) if self.running is None else self.running.going_on_at
         choice = self._encoder.choice(self.running, before, piece)
         timed = TimedCommand(choice.time_s, piece, choice.command, before(choice.time_s))
         latest_s = piece.end_s + self._step_s - self._spacing_s(timed.expected.angle_deg)

@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.arrays import FloatArray
+from planner.defaults import RUN_ON_DEG
 from planner.execution.run_on import latest_s
-from planner.execution.stream import TimedCommand, check_it_fits, reference_states, rounded_stream, stream
+from planner.execution.stream import Streaming, TimedCommand, check_it_fits, reference_states, rounded_stream, stream
 from planner.execution.table_motion import TableMotion
 from planner.plans.plan import Plan
 from planner.table.cost import PathCost
@@ -165,3 +166,18 @@ def test_limits_that_the_wire_cannot_say_are_refused() -> None:
     motion = TableMotion(plan_of([0.0], 0.1), Limits(0.05, 1.0))
     with pytest.raises(StreamError, match=r"must be at least 0\.1"):
         stream(motion, Limits(0.05, 1.0), Wire())
+
+
+def test_a_stream_that_is_computed_again_follows_the_plan_as_the_first_one() -> None:
+    """From any command on: its target serves until the next one, and does not brake the table before that."""
+    limits = Limits(40.0, 100.0)
+    motion = TableMotion(plan_of([-20.0, 2.93, 16.69, 0.89, 0.0], 1.15), limits)
+    streaming = Streaming(motion, limits, Wire(), RUN_ON_DEG)
+    commands = streaming.commands()
+    for k, (running, following) in enumerate(pairwise(commands)):
+        again = next(streaming.commands_after(running, k + 1, following.time_s))
+        end_s = following.leg.end_s
+        if following.leg.command is None:
+            times_s = np.linspace(again.time_s, end_s, 20)[:-1]
+            reached = [again.going_on_at(time_s).angle_deg for time_s in times_s.tolist()]
+            assert np.abs(reached - motion.angles_at(times_s)).max() < 0.2

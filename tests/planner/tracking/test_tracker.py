@@ -60,6 +60,30 @@ def test_a_path_is_tracked_to_its_end_and_the_reference_follows_the_decisions() 
     assert tracker.missed == 0
 
 
+def test_the_reference_follows_between_the_locations_too_where_steps_are_long() -> None:
+    """The target of a command brakes the table only after the next one would be late; the next one counts on that."""
+    path, step_s, commands = locations(47)[::2], 1.5, []
+    tracker = begun_tracker(path, limits=Limits(30.0, 15.0), step_s=step_s)
+    times: list[float] = []
+    decided: list[float] = []
+    while True:
+        for T in path[tracker.count : tracker.count + tracker.room]:
+            tracker.reveal(T)
+        if tracker.count == len(path):
+            tracker.end()
+        tracked = asked(tracker)
+        if tracked is None:
+            break
+        assert tracker.running is not None
+        commands.append(tracker.running)
+        if tracked.step is not None and tracked.step.kind is Kind.SCAN:
+            sampled = tracker.motion.decided_s - step_s * np.linspace(0.9, 0.0, 10)
+            times += sampled.tolist()
+            decided += [tracker.motion.state_at(time_s).angle_deg for time_s in sampled.tolist()]
+    reached = [state.angle_deg for state in reference_states(commands, times)]
+    assert np.abs(np.subtract(reached, decided)).max() < 0.1
+
+
 def test_the_arm_is_obeyed_and_its_targets_come_with_the_steps() -> None:
     path = locations()
     tracker = begun_tracker(path, view=8)

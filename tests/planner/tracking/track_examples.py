@@ -73,10 +73,15 @@ def new_tracker(
 
 
 def begun_tracker(
-    T_WS: FloatArray, view: int = 8, arm: Arm | None = None, ends: bool = True, limits: Limits | None = None
+    T_WS: FloatArray,
+    view: int = 8,
+    arm: Arm | None = None,
+    ends: bool = True,
+    limits: Limits | None = None,
+    step_s: float | None = None,
 ) -> Tracker:
     """Return a tracker that rests at the start and has its first view; with all in view, the path ends or goes on."""
-    tracker = new_tracker(view, arm=arm, limits=limits)
+    tracker = new_tracker(view, step_s, arm, limits)
     for T in T_WS[: tracker.room]:
         tracker.reveal(T)
     if ends and tracker.count == len(T_WS):
