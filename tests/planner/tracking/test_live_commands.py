@@ -66,7 +66,7 @@ def carried_out(source: TimedSource, wait_s: float, is_real_time: bool) -> tuple
 
 
 def test_locations_that_trickle_in_slower_than_the_table_resumes_are_waited_for() -> None:
-    """The table goes on with a view of several locations; each that comes begins the wait anew."""
+    """The table goes on with a view of several locations; each that comes starts the wait again."""
     rest = locations()[VIEW + 1 :]
     source = TimedSource(rest, [4.0 * (k + 1) for k in range(len(rest))], ends=True)
     observer, fault, _ = carried_out(source, wait_s=5.0, is_real_time=True)
