@@ -27,6 +27,7 @@ class _Shown(ctypes.Structure):
         ("lost_edges", ctypes.c_uint32),
         ("duty_changes", ctypes.c_uint32),
         ("overrun_bytes", ctypes.c_uint32),
+        ("pwm_steps", ctypes.c_int32),
         ("line_count", ctypes.c_int32),
         ("sent_count", ctypes.c_uint32),
         ("sent", ctypes.c_uint8 * _MOST_SENT),
@@ -124,6 +125,11 @@ class Chip:
     def overrun_bytes(self) -> int:
         """Bytes for which the hardware had no room."""
         return int(self._shown.overrun_bytes)
+
+    @property
+    def pwm_steps(self) -> int:
+        """The steps of a PWM period: the duty that is fully on."""
+        return int(self._shown.pwm_steps)
 
     @property
     def is_sending(self) -> bool:

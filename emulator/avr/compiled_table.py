@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from emulator.avr.chip import Chip
 from emulator.avr.elf import ElfError, Program, read_program
-from emulator.avr.errors import ToolchainError
+from emulator.avr.errors import ChipError, ToolchainError
 from emulator.avr.header import digest_of, uart_of
 from emulator.avr.toolchain import build_firmware
 from emulator.config.constants import drive_constants, encoder_constants
@@ -72,6 +72,7 @@ class CompiledTable:
     Raises:
         ConfigError: the controller cannot run such a table.
         ToolchainError: the firmware cannot be built or run on this machine, or is for another table.
+        ChipError: it does not start, or sets up another PWM.
     """
 
     hung_up = False
@@ -244,6 +245,8 @@ class CompiledTable:
 
     def _switch_on(self, count: int) -> None:
         self.chip = Chip(self._program, self.config.control.tick_hz, self._bit_cycles, count)
+        if self.chip.pwm_steps != self.config.driver.duty_max:
+            raise ChipError(f"its PWM has {self.chip.pwm_steps} steps instead of {self.config.driver.duty_max}")
         self._resting = False
 
     def _quiet_ticks(self, end: int) -> int:

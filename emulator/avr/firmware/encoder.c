@@ -15,6 +15,13 @@ static uint16_t sampled_edges;
 int32_t encoder_position; /* brought level at each tick */
 static bool trigger_was_high;
 
+/* Return the 32-bit count after some edges since the last tick. In unsigned arithmetic, where running over the end of
+   the range is defined: the counter goes on at the other. */
+static inline int32_t count_after(uint16_t edges_since)
+{
+    return (int32_t)((uint32_t)encoder_position + (uint32_t)(int32_t)(int16_t)edges_since);
+}
+
 /* Where between four counts the encoder stands: channels A and B are a Gray code. */
 static inline uint8_t phase(void)
 {
@@ -54,7 +61,7 @@ ISR(PCINT1_vect)
 {
     const bool is_high = board_trigger_is_high();
     if (!is_high || trigger_was_high) {
-        latched_count = encoder_position + (int16_t)(edges - sampled_edges);
+        latched_count = count_after((uint16_t)(edges - sampled_edges));
     }
     trigger_was_high = is_high;
 }
@@ -62,8 +69,7 @@ ISR(PCINT1_vect)
 int32_t encoder_sample(void)
 {
     const uint16_t now = edges;
-    /* In unsigned arithmetic, where running over the end of the range is defined: the counter goes on at the other. */
-    encoder_position = (int32_t)((uint32_t)encoder_position + (uint32_t)(int32_t)(int16_t)(now - sampled_edges));
+    encoder_position = count_after((uint16_t)(now - sampled_edges));
     sampled_edges = now;
     return encoder_position;
 }

@@ -91,7 +91,9 @@ void line_write(const char *bytes, uint8_t length)
     }
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE) /* the transmit interrupt changes the same register */
     {
-        UCSR0B |= _BV(UDRIE0);
+        if (transmit_tail != transmit_head) { /* a fast line may have sent all of it during a tick */
+            UCSR0B |= _BV(UDRIE0);
+        }
     }
 }
 

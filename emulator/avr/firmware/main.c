@@ -5,6 +5,7 @@
    that is left, between two ticks. */
 #include <avr/interrupt.h>
 #include <avr/sleep.h>
+#include <avr/wdt.h>
 #include <stdbool.h>
 
 #include "board.h"
@@ -61,8 +62,10 @@ int main(void)
     controller_init(wake_count);
     command_init();
     line_init();
+    wdt_enable(WDTO_60MS); /* a program that is stuck would leave the bridge on; a reset switches it off */
     for (;;) {
         sleep_until_tick_is_over();
+        wdt_reset();
         line_poll();
     }
 }

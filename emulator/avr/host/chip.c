@@ -29,9 +29,13 @@ DEFINE_FIFO(uint16_t, uart_fifo);
 
 /* Addresses in the data space, from the data sheet. */
 #define PINS_B 0x25        /* PORTB */
+#define TCCR1B 0x81
+#define ICR1_LOW 0x86
+#define ICR1_HIGH 0x87
 #define OCR1A_LOW 0x88
 #define OCR1A_HIGH 0x89
 #define DIRECTION 0x01     /* PB0 */
+#define WGM13 0x10         /* set in the modes whose period is ICR1, among those with WGM10 clear */
 
 enum kind { EDGE_FORWARD, EDGE_BACKWARD, TRIGGER_DOWN, BYTE };
 
@@ -48,6 +52,7 @@ struct chip {
     uint32_t lost_edges;     /* interrupts that came while the last one of the same channel still waited */
     uint32_t duty_changes;   /* ticks amid which the duty became another */
     uint32_t overrun_bytes;  /* that came while two others waited in the hardware */
+    int32_t pwm_steps;       /* of a period */
     int32_t line_count;      /* bytes that are leaving */
     uint32_t sent_count;     /* bytes whose stop bit has left */
     uint8_t sent[MOST_SENT];
@@ -91,6 +96,15 @@ static int32_t bridge_duty(const struct chip *chip)
     const uint8_t *data = chip->avr->data;
     const int32_t steps = data[OCR1A_LOW] | data[OCR1A_HIGH] << 8;
     return data[PINS_B] & DIRECTION ? -steps : steps;
+}
+
+/* ICR1 can be written only while timer 1 is in a mode whose period it is. simavr would take it at any time. */
+static void write_period(avr_t *avr, avr_io_addr_t address, uint8_t byte, void *param)
+{
+    (void)param;
+    if (avr->data[TCCR1B] & WGM13) {
+        avr->data[address] = byte;
+    }
 }
 
 static void tick_changed(avr_irq_t *irq, uint32_t is_running, void *param)
@@ -205,6 +219,7 @@ static int run_slice(struct chip *chip)
         }
     }
     chip->duty = bridge_duty(chip);
+    chip->pwm_steps = avr->data[ICR1_LOW] | avr->data[ICR1_HIGH] << 8;
     chip->has_started = 1;
     while (chip->line_count && chip->left_at[chip->line_first] <= avr->cycle && chip->sent_count < MOST_SENT) {
         chip->sent[chip->sent_count++] = chip->on_the_line[chip->line_first];
@@ -270,6 +285,8 @@ struct chip *chip_new(const uint8_t *flash, uint32_t size, uint32_t tick_hz, uin
     chip->phase = FIRST_PHASE;
     chip->tick_period = FREQUENCY / tick_hz;
     chip->byte_cycles = 10 * bit_cycles;
+    avr_register_io_write(avr, ICR1_LOW, write_period, chip);
+    avr_register_io_write(avr, ICR1_HIGH, write_period, chip);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), byte_sent, chip);
     avr_irq_register_notify(avr_get_interrupt_irq(avr, TICK_VECTOR) + AVR_INT_IRQ_RUNNING, tick_changed, chip);
     return chip;

@@ -1,11 +1,13 @@
 """The compiled firmware beside the emulator: equal duty at every tick, equal replies, in the time that there is."""
 
+from pathlib import Path
+
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from emulator.avr.compiled_table import CompiledTable
-from emulator.avr.toolchain import build_firmware
+from emulator.avr.toolchain import FIRMWARE, build_firmware
 from emulator.config.table_config import load_config
 from tests.emulator.avr.toolchain_mark import needs_toolchain
 from tools.firmware import FLASH_BYTES, RAM_BYTES, sizes
@@ -101,3 +103,34 @@ def test_the_latch_is_within_a_count_of_the_encoder_at_any_share_of_a_tick() -> 
         instant = before + share * (after.encoder_deg - before)
         assert abs(after.latched_deg - instant) * 512 <= 1.5
     assert after.encoder_deg - before > 10 / 512
+
+
+def planted(folder: Path, file: str, old: str, new: str) -> CompiledTable:
+    """Return a table whose firmware has another text in one of its sources."""
+    for source in FIRMWARE.glob("*.[ch]"):
+        text = source.read_text(encoding="ascii")
+        if source.name == file:
+            assert text.count(old) == 1
+            text = text.replace(old, new)
+        (folder / source.name).write_text(text, encoding="ascii")
+    return CompiledTable(load_config(), firmware=build_firmware(load_config(), folder))
+
+
+def test_a_program_that_is_stuck_is_reset_and_the_bridge_is_off(tmp_path: Path) -> None:
+    entry = "void controller_step(int32_t count)\n{\n"
+    table = planted(tmp_path, "controller.c", entry, f"{entry}    while (count > 300) {{\n    }}\n")
+    table.receive(b"R 90\r")
+    table.advance(1000)
+    assert table.duty == 0
+    table.receive(b"H\r")
+    table.advance(100)
+    assert table.transmit() == b"OK\rH 0.0\r"
+
+
+def test_a_reply_that_has_left_before_its_interrupt_is_switched_on_is_sent_once(tmp_path: Path) -> None:
+    entry = "    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) /* the transmit interrupt"
+    wait = "    for (volatile uint32_t n = 10000; n != 0; --n) {\n    }\n"
+    table = planted(tmp_path, "line.c", entry, wait + entry)
+    table.receive(b"H\rH\r")
+    table.advance(300)
+    assert table.transmit() == b"H 0.0\rH 0.0\r"
