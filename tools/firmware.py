@@ -22,7 +22,7 @@ from tools.lockstep import PartingError, run_edges
 FLASH_BYTES = 32 * 1024
 RAM_BYTES = 2 * 1024
 _TICKS = 3000
-_EXPECTED = (ConfigError, ToolchainError, ChipError, PartingError, subprocess.CalledProcessError)
+_EXPECTED = (ConfigError, ToolchainError, ChipError, PartingError)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -52,7 +52,7 @@ def _run(options: argparse.Namespace) -> int:
     with whole_file(elf) as partial:
         copyfile(built, partial)
     with whole_file(hexadecimal) as partial:
-        subprocess.run(["avr-objcopy", "-O", "ihex", str(elf), str(partial)], check=True)  # noqa: S607  # on the path, as avr-gcc
+        _run_tool("avr-objcopy", "-O", "ihex", str(elf), str(partial))
     for line in figures(config, elf):
         print(line)
     return 0
@@ -77,9 +77,18 @@ def figures(config: TableConfig, elf: Path) -> list[str]:
 
 def sizes(elf: Path) -> tuple[int, int]:
     """Return the bytes of flash and of RAM that a firmware takes, without the stack."""
-    output = subprocess.run(["avr-size", str(elf)], check=True, capture_output=True, text=True).stdout  # noqa: S607  # on the path, as avr-gcc
+    output = _run_tool("avr-size", str(elf))
     text, data, bss = (int(word) for word in output.splitlines()[1].split()[:3])
     return text + data, data + bss
+
+
+def _run_tool(*command: str) -> str:
+    try:
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    except FileNotFoundError as error:
+        raise ToolchainError(f"{command[0]} is not installed; install the package binutils-avr") from error
+    except subprocess.CalledProcessError as error:
+        raise ToolchainError(f"{command[0]} failed: {error.stderr.strip().splitlines()[-1]}") from error
 
 
 if __name__ == "__main__":

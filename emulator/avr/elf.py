@@ -65,6 +65,9 @@ def _symbols(data: bytes, offset: int, size: int, names_at: int) -> dict[str, in
     symbols = {}
     for place in range(offset, offset + size, _SYMBOL.size):
         name_at, value, _, _, _, _ = _SYMBOL.unpack_from(data, place)
-        name = data[names_at + name_at : data.index(b"\0", names_at + name_at)].decode("ascii")
+        end = data.find(b"\0", names_at + name_at)
+        if end < 0:
+            raise ElfError("a damaged ELF file: a name without an end")
+        name = data[names_at + name_at : end].decode("ascii")
         symbols[name] = value
     return symbols

@@ -18,10 +18,14 @@ from emulator.table.interpreter import Interpreter
 CLOCK_HZ = 16_000_000
 MOST_EDGES_S = 30_000
 """Edges of the encoder a second that the interrupt counts without loss, with the line busy."""
+MOST_BAUD = 250_000
+MOST_TICK_HZ = 1250
+"""With a faster line or tick, its interrupts take the time of the tick: edges and ticks are lost."""
 _MOST_WINDOW_TICKS = 64
 _TIMER_CLOCKS = {1: 1, 8: 2, 32: 3, 64: 4, 128: 5, 256: 6, 1024: 7}
 """The prescalers of timer 2, and the bits that select them."""
 _RATE_TOLERANCE = Fraction(22, 1000)
+_MOST_DIVIDER = 4095
 _WORD = 1 << 64
 
 
@@ -58,31 +62,42 @@ def digest_of(config: TableConfig) -> str:
 
 
 def uart_of(baud: int) -> Uart:
-    """Return the setting nearest to a baud rate; normal speed samples more often, so it is preferred.
+    """Return the setting nearest to a baud rate; of two the one at normal speed, which samples a bit more often.
 
     Raises:
         ConfigError: no setting is near enough.
     """
-    for double_speed in (False, True):
-        divisor = 8 if double_speed else 16
-        divider = round(Fraction(CLOCK_HZ, divisor * baud)) - 1 if baud else -1
-        if 0 <= divider <= 4095 and abs(Fraction(CLOCK_HZ, divisor * (divider + 1) * baud) - 1) <= _RATE_TOLERANCE:
-            return Uart(divider, double_speed)
-    raise ConfigError(
-        f"serial.baud is {baud}; a controller of 16 MHz makes rates of 244 to 2000000 baud that it divides within 2 %, "
-        "such as 9600, 38400 and 57600"
-    )
+    settings = [
+        Uart(divider, double_speed)
+        for double_speed in (False, True)
+        if 0 < baud <= MOST_BAUD and 0 <= (divider := _divider(baud, double_speed=double_speed)) <= _MOST_DIVIDER
+    ]
+    nearest = min(settings, key=lambda uart: _rate_error(uart, baud), default=None)
+    if nearest is None or _rate_error(nearest, baud) > _RATE_TOLERANCE:
+        raise ConfigError(
+            f"serial.baud is {baud}; a controller of 16 MHz makes rates of 244 to {MOST_BAUD} baud that it divides "
+            "within 2.2 %, such as 9600, 38400, 57600 and 115200"
+        )
+    return nearest
+
+
+def _divider(baud: int, *, double_speed: bool) -> int:
+    return round(Fraction(CLOCK_HZ, (8 if double_speed else 16) * baud)) - 1
+
+
+def _rate_error(uart: Uart, baud: int) -> Fraction:
+    return abs(Fraction(CLOCK_HZ, uart.cycles_per_bit * baud) - 1)
 
 
 def _tick_timer(tick_hz: int) -> tuple[int, int]:
     """Return prescaler and counts of timer 2 for a tick of exactly this rate."""
     for prescaler in _TIMER_CLOCKS:
         counts = Fraction(CLOCK_HZ, prescaler * tick_hz)
-        if counts.denominator == 1 and 2 <= counts <= 256:
+        if counts.denominator == 1 and 2 <= counts <= 256 and tick_hz <= MOST_TICK_HZ:
             return prescaler, int(counts)
     raise ConfigError(
-        f"control.tick_hz is {tick_hz}; the 8-bit timer of a controller of 16 MHz cannot make this tick exactly; "
-        "it makes 250, 500, 625, 1000, 1250, 2000, ... Hz"
+        f"control.tick_hz is {tick_hz}; a controller of 16 MHz with an 8-bit timer makes ticks of 62.5 to "
+        f"{MOST_TICK_HZ} Hz that divide its clock, such as 250, 500, 625, 1000 and 1250"
     )
 
 

@@ -5,6 +5,7 @@ it is complete.
 """
 
 import hashlib
+import os
 import subprocess
 from functools import cache
 from pathlib import Path
@@ -21,6 +22,7 @@ FIRMWARE = Path(__file__).with_name("firmware")
 CONSTANTS = FIRMWARE / "table_constants.h"
 _SHIM = Path(__file__).with_name("host") / "chip.c"
 _GAINS = "gains.h"
+_LONGEST_REASON = 300
 _HEADERS = Path("/usr/include/simavr/sim_avr.h")
 _INSTALL = "install the packages gcc, gcc-avr, avr-libc and libsimavr-dev (apt-get install ...)"
 
@@ -34,9 +36,11 @@ _COMPILE_SHIM = ("gcc", "-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-sh
 
 def lacking() -> str:
     """Return what this machine lacks to build the firmware and run it, or nothing."""
-    for program in ("avr-gcc", "gcc"):
+    for program in ("avr-gcc", "avr-objcopy", "gcc"):
         if which(program) is None:
             return f"{program} is not installed; {_INSTALL}"
+    if not _has_avr_libc():
+        return f"avr-libc is not installed; {_INSTALL}"
     return "" if _HEADERS.is_file() else f"libsimavr-dev is not installed; {_INSTALL}"
 
 
@@ -50,14 +54,13 @@ def build_firmware(config: TableConfig, sources: Path = FIRMWARE, gains: Path | 
 
     Raises:
         ConfigError: the controller cannot run such a table.
-        ToolchainError: it cannot be built.
-        OSError: a source cannot be read.
+        ToolchainError: it cannot be built, or a file cannot be read.
     """
     files = {source.name: source.read_bytes() for source in sorted(sources.glob("*.[ch]"))}
     files[CONSTANTS.name] = header_text(config, "a table's configuration").encode("ascii")
     options = list(COMPILE)
     if gains is not None:
-        files[_GAINS] = gains.read_bytes()
+        files[_GAINS] = _gains_source(gains)
         options += ["-include", _GAINS]
     digest = hashlib.sha256(f"{_version('avr-gcc')}{options}".encode())
     for name, content in files.items():
@@ -67,7 +70,7 @@ def build_firmware(config: TableConfig, sources: Path = FIRMWARE, gains: Path | 
         with TemporaryDirectory() as folder:
             for name, content in files.items():
                 (Path(folder) / name).write_bytes(content)
-            _compile(built, [*options, f"-I{folder}", *(f"{folder}/{name}" for name in files if name.endswith(".c"))])
+            _compile(built, [*options, *(name for name in files if name.endswith(".c"))], Path(folder))
     return built
 
 
@@ -82,7 +85,7 @@ def build_simulator() -> Path:
         digest.update(part.encode())
     built = _folder() / f"chip-{digest.hexdigest()[:24]}.so"
     if not built.is_file():
-        _compile(built, [*_COMPILE_SHIM, str(_SHIM), "-lsimavr", "-lm"])
+        _compile(built, [*_COMPILE_SHIM, _SHIM.name, "-lsimavr", "-lm"], _SHIM.parent)
     return built
 
 
@@ -95,18 +98,50 @@ def _folder() -> Path:
     return folder
 
 
-def _compile(built: Path, command: list[str]) -> None:
+def _gains_source(file: Path) -> bytes:
+    """Return `gains.h`, and after it a line that does not compile unless it was one."""
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise ToolchainError(f"{file}: {error.strerror}; name a gains.h of `python -m tools.tune`") from error
+    return content + f'\n#ifndef TABLE_GAINS_H\n#error "{_GAINS} is not one of tools.tune"\n#endif\n'.encode()
+
+
+def _compile(built: Path, command: list[str], folder: Path) -> None:
     try:
         with whole_file(built) as partial:
             subprocess.run(  # noqa: S603  # the command is ours
-                [*command, "-o", str(partial)], check=True, capture_output=True, text=True
+                [*command, "-o", str(partial.absolute())],
+                check=True,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                cwd=folder,
+                env=os.environ | {"LC_ALL": "C"},
             )
     except FileNotFoundError as error:
         raise ToolchainError(f"{command[0]} is not installed; {_INSTALL}") from error
     except subprocess.CalledProcessError as error:
-        raise ToolchainError(f"{command[0]} failed: {error.stderr.strip()}; {_INSTALL}") from error
+        raise ToolchainError(f"{command[0]} failed: {_first_error(error.stderr)}") from error
     except OSError as error:
         raise ToolchainError(f"{built}: {error.strerror}; set XDG_CACHE_HOME to a folder with room") from error
+
+
+def _first_error(printed: str) -> str:
+    """Return what a compiler complains of first, as one line."""
+    lines = [line for line in printed.splitlines() if line.strip()]
+    first = next((line for line in lines if "error:" in line), lines[0] if lines else "it gives no reason")
+    is_missing = "No such file" in first or "cannot find" in printed
+    text = "".join(letter if letter.isprintable() else "?" for letter in first[:_LONGEST_REASON])
+    return text + (f"; {_INSTALL}" if is_missing else "")
+
+
+def _has_avr_libc() -> bool:
+    """Tell whether the start-up code of the controller is there: without it the compiler prints the bare name."""
+    start = "crtatmega328p.o"
+    asked = ["avr-gcc", "-mmcu=atmega328p", f"-print-file-name={start}"]
+    printed = subprocess.run(asked, check=False, capture_output=True, text=True).stdout.strip()  # noqa: S603  # a compiler
+    return printed not in {"", start}
 
 
 def _version(compiler: str) -> str:

@@ -1,11 +1,13 @@
 """`python -m tools.firmware` and `tools.firmware_header`: the firmware of a table, and its constants."""
 
 from pathlib import Path
+from shutil import which
 
 import pytest
 
 from emulator.avr.elf import read_program
 from emulator.avr.header import header_text
+from emulator.avr.toolchain import build_firmware
 from emulator.config.table_config import load_config
 from tests.emulator.avr.toolchain_mark import needs_toolchain
 from tools.firmware import main
@@ -24,6 +26,19 @@ def test_elf_and_hex_are_written_and_their_figures_printed(tmp_path: Path, capsy
     data = b"".join(bytes.fromhex(line[9 : 9 + 2 * int(line[1:3], 16)]) for line in lines if line[7:9] == "00")
     assert data == flash
     assert {file.name for file in tmp_path.iterdir()} == {"table.elf", "table.hex"}
+
+
+@needs_toolchain
+def test_a_missing_tool_is_named_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    build_firmware(load_config())
+    compiler = which("avr-gcc")
+    assert compiler is not None
+    (tmp_path / "avr-gcc").symlink_to(compiler)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert main(["--out", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err == ("firmware: avr-objcopy is not installed; install the package binutils-avr\n")
 
 
 @needs_toolchain

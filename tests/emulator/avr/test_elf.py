@@ -1,9 +1,10 @@
 """Reading a firmware's file: a damaged one is refused, never run."""
 
 import struct
+from contextlib import suppress
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from emulator.avr.elf import DATA_SPACE, ElfError, read_program
@@ -34,6 +35,27 @@ def test_a_damaged_file_is_refused_or_read(data: st.DataObject) -> None:
     except ElfError:
         return
     assert len(program.flash) < 1 << 20
+
+
+@needs_toolchain
+@settings(max_examples=30)
+@given(st.data())
+def test_a_firmware_that_was_cut_or_damaged_is_refused_or_read(data: st.DataObject) -> None:
+    whole = build_firmware(load_config()).read_bytes()
+    damaged = bytearray(whole[: data.draw(st.integers(0, len(whole)))])
+    for place in data.draw(st.lists(st.integers(0, 51), max_size=3)):
+        damaged[place : place + 1] = data.draw(st.binary(min_size=1, max_size=1))
+    with suppress(ElfError):
+        read_program(bytes(damaged))
+
+
+def test_a_name_without_an_end_is_refused() -> None:
+    symbol_table = struct.pack("<IIIIIIIIII", 0, 2, 0, 0, 132, 16, 1, 0, 0, 0)
+    names = struct.pack("<IIIIIIIIII", 0, 3, 0, 0, 148, 4, 0, 0, 0, 0)
+    header = HEADER[:32] + struct.pack("<I", 52) + HEADER[36:48] + struct.pack("<HH", 2, 0)
+    symbol = struct.pack("<IIIBBH", 0, 0, 0, 0, 0, 0)
+    with pytest.raises(ElfError, match="a name without an end"):
+        read_program(header + symbol_table + names + symbol + b"main")
 
 
 @needs_toolchain

@@ -1,5 +1,6 @@
 """Building: what is missing is named, and nothing is left half built."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,34 @@ def test_gains_for_another_tick_are_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(ToolchainError, match=r"gains\.h is for another tick, window or PWM"):
         build_firmware(load_config(), gains=gains)
+
+
+@needs_toolchain
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", r"gains\.h is not one of tools\.tune"),
+        (b"#define GAINS_RAMP_PROPORTIONAL 5L\n", r"gains\.h"),
+        (b"\xf4\x00\xff \x1b[31m\r\n" * 30, r"gains\.h"),
+        (None, r"No such file or directory; name a gains\.h"),
+    ],
+)
+def test_a_file_that_is_no_gains_file_is_refused_in_one_line(content: bytes | None, words: str, tmp_path: Path) -> None:
+    gains = tmp_path / "gains.h"
+    if content is not None:
+        gains.write_bytes(content)
+    with pytest.raises(ToolchainError, match=words) as refusal:
+        build_firmware(load_config(), gains=gains)
+    assert str(refusal.value).isprintable()
+
+
+@needs_toolchain
+def test_a_compiler_without_the_library_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    compiler = tmp_path / "avr-gcc"
+    compiler.write_text("#!/bin/sh\necho crtatmega328p.o\n", encoding="ascii")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    assert "avr-libc is not installed" in lacking()
 
 
 @needs_toolchain
