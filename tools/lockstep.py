@@ -59,6 +59,8 @@ _QUIET_TICKS = (1, 4, 20, 60, 200, 600, 2500)
 _LOADS_NM = (0.0, 0.0, 0.2, -0.2, 3.0)
 _LINES_AT_ONCE = (1, 1, 1, 2)
 """The replies to more of them could fill the transmit buffer, which the two empty up to a tick apart."""
+_SHORT_LINE = 4
+"""Bytes. Where a tick carries more, two lines may arrive in one; the second may then take effect a tick later."""
 _BEFORE_CARRY = 253
 """Edges after which one more changes both bytes of the counter, which begins at the phase 2 of the encoder."""
 _CYCLES_ABOUT_A_TICK = 420
@@ -162,9 +164,10 @@ def run_lockstep(config: TableConfig, ticks: int, seed: int, firmware: Path | No
     """
     chance = Random(seed)  # noqa: S311  # no secret
     pair, done = Pair(config, seed, firmware), Lockstep()
+    is_fast_line = config.serial.baud > 10 * _SHORT_LINE * config.control.tick_hz
     while done.ticks < ticks:
         _disturb(pair, chance)
-        for _ in range(chance.choice(_LINES_AT_ONCE)):
+        for _ in range(1 if is_fast_line else chance.choice(_LINES_AT_ONCE)):
             line = random_line(chance, config)
             pair.send(line)
             done.lines += 1

@@ -18,7 +18,7 @@ from emulator.table.interpreter import Interpreter
 CLOCK_HZ = 16_000_000
 MOST_EDGES_S = 30_000
 """Edges of the encoder a second that the interrupt counts without loss, with the line busy."""
-MOST_BAUD = 250_000
+MOST_BAUD = 115_200
 MOST_TICK_HZ = 1250
 """With a faster line or tick, its interrupts take the time of the tick: edges and ticks are lost."""
 _MOST_WINDOW_TICKS = 64
@@ -76,7 +76,7 @@ def uart_of(baud: int) -> Uart:
     if nearest is None or _rate_error(nearest, baud) > _RATE_TOLERANCE:
         raise ConfigError(
             f"serial.baud is {baud}; a controller of 16 MHz makes rates of 244 to {MOST_BAUD} baud that it divides "
-            "within 2.2 %, such as 9600, 38400, 57600 and 115200"
+            "within 2.2 %, such as 9600, 38400 and 57600"
         )
     return nearest
 

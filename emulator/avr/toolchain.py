@@ -1,12 +1,13 @@
 """Building the firmware, and the simulator's library, with the compilers of the distribution.
 
 Build results are stored in the user's cache folder under a digest of all their inputs. A result appears there only when
-it is complete.
+it is complete. It is used only if no other user can have written it, since it is machine code.
 """
 
 import hashlib
 import os
 import subprocess
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from shutil import which
@@ -16,7 +17,7 @@ from emulator.avr.errors import ToolchainError
 from emulator.avr.header import header_text
 from emulator.config.table_config import TableConfig
 from protocol.files.whole_file import whole_file
-from protocol.kernels.kept_file import cache_root
+from protocol.kernels.kept_file import cache_root, is_own, prune
 
 FIRMWARE = Path(__file__).with_name("firmware")
 CONSTANTS = FIRMWARE / "table_constants.h"
@@ -66,7 +67,7 @@ def build_firmware(config: TableConfig, sources: Path = FIRMWARE, gains: Path | 
     for name, content in files.items():
         digest.update(f"{name} {len(content)}\n".encode() + content)
     built = _folder() / f"table-{digest.hexdigest()[:24]}.elf"
-    if not built.is_file():
+    if not _is_kept(built):
         with TemporaryDirectory() as folder:
             for name, content in files.items():
                 (Path(folder) / name).write_bytes(content)
@@ -84,7 +85,7 @@ def build_simulator() -> Path:
     for part in (_version("gcc"), " ".join(_COMPILE_SHIM)):
         digest.update(part.encode())
     built = _folder() / f"chip-{digest.hexdigest()[:24]}.so"
-    if not built.is_file():
+    if not _is_kept(built):
         _compile(built, [*_COMPILE_SHIM, _SHIM.name, "-lsimavr", "-lm"], _SHIM.parent)
     return built
 
@@ -98,6 +99,18 @@ def _folder() -> Path:
     return folder
 
 
+def _is_kept(built: Path) -> bool:
+    try:
+        status = built.lstat()
+    except OSError:
+        return False
+    if not is_own(status) or not status.st_size:
+        return False
+    with suppress(OSError):  # a folder that can only be read
+        built.touch()  # it is in use; see `prune`
+    return True
+
+
 def _gains_source(file: Path) -> bytes:
     """Return `gains.h`, and after it a line that does not compile unless it was one."""
     try:
@@ -108,6 +121,7 @@ def _gains_source(file: Path) -> bytes:
 
 
 def _compile(built: Path, command: list[str], folder: Path) -> None:
+    prune(cache_root())
     try:
         with whole_file(built) as partial:
             subprocess.run(  # noqa: S603  # the command is ours
@@ -119,6 +133,7 @@ def _compile(built: Path, command: list[str], folder: Path) -> None:
                 cwd=folder,
                 env=os.environ | {"LC_ALL": "C"},
             )
+            partial.chmod(0o700)
     except FileNotFoundError as error:
         raise ToolchainError(f"{command[0]} is not installed; {_INSTALL}") from error
     except subprocess.CalledProcessError as error:

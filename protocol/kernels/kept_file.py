@@ -26,7 +26,7 @@ FIELD = ".field"
 UNUSED_DAYS = 60
 """A file that no run has used for so long is deleted when a new one is kept."""
 
-_SUFFIXES = (KERNEL, FIELD, ".lock", ".nbi", ".nbc", ".npz")
+_SUFFIXES = (KERNEL, FIELD, ".elf", ".so", ".lock", ".nbi", ".nbc", ".npz")
 """Of the files here, and in former layouts of the folder."""
 PATIENCE_S = 60.0
 """How long to wait for another process that makes a file, but may have been suspended meanwhile."""
@@ -121,6 +121,12 @@ def _seal(name: str, content: bytes) -> bytes:
     return hashlib.sha256(name.encode() + b"\0" + content).digest()
 
 
+def is_own(status: os.stat_result) -> bool:
+    """Tell whether a file is a plain one that belongs to this user, and that no other user can write."""
+    is_ours = not hasattr(os, "geteuid") or (status.st_uid == os.geteuid() and not status.st_mode & 0o022)
+    return is_ours and stat.S_ISREG(status.st_mode)
+
+
 def _own_content(file: Path) -> tuple[bytes, float]:
     """Return what a file holds, and when it was last written or touched.
 
@@ -129,8 +135,6 @@ def _own_content(file: Path) -> tuple[bytes, float]:
     """
     with open(file, "rb", opener=lambda path, flags: os.open(path, flags | _OPEN_FLAGS)) as opened:
         status = os.fstat(opened.fileno())
-        if not stat.S_ISREG(status.st_mode):
-            raise PermissionError(f"{file}: not a plain file")
-        if hasattr(os, "geteuid") and (status.st_uid != os.geteuid() or status.st_mode & 0o022):
-            raise PermissionError(f"{file}: another user may have written it")
+        if not is_own(status):
+            raise PermissionError(f"{file}: not a plain file, or another user may have written it")
         return opened.read(), status.st_mtime

@@ -78,6 +78,30 @@ def test_a_compiler_without_the_library_is_named(monkeypatch: pytest.MonkeyPatch
 
 
 @needs_toolchain
+@pytest.mark.parametrize("spoiled", ["empty", "writable for others", "a link"])
+def test_a_kept_file_that_another_may_have_made_is_built_again(
+    spoiled: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    for build in (build_simulator, lambda: build_firmware(load_config())):
+        built = build()
+        good = built.read_bytes()
+        if spoiled == "empty":
+            built.write_bytes(b"")
+        elif spoiled == "a link":
+            (other := tmp_path / "other").write_bytes(b"not ours")
+            built.unlink()
+            built.symlink_to(other)
+        else:
+            built.write_bytes(b"not ours")
+            built.chmod(0o777)
+        assert build() == built
+        assert not built.is_symlink()
+        assert built.read_bytes() == good
+
+
+@needs_toolchain
 def test_what_was_built_is_kept() -> None:
     built = build_firmware(load_config())
     assert build_firmware(load_config()) == built
