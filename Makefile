@@ -3,7 +3,7 @@
 # make lint    format, lint, type and prose checks
 # make docs    build the docs site into build/site
 # make firmware CONFIG=table.toml GAINS=gains.h   build the firmware of a table into build/firmware; both are optional
-# make flash PORT=/dev/ttyUSB0   write it into an Arduino board with an ATmega328P
+# make flash PORT=/dev/ttyUSB0   write what was built last into an Arduino board with an ATmega328P; with CONFIG or GAINS build it first
 # make mutants plant 200 small faults and see which of them the tests do not find (half an hour)
 
 PYTHON ?= python3
@@ -35,10 +35,13 @@ docs: $(VENV)/test.stamp
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict -f docs/site/mkdocs.yml
 
 firmware: $(VENV)/demo.stamp
+	@rm -f build/firmware/table.hex   # if this build fails, `make flash` must not write the one before
 	$(BIN)/python -m tools.firmware $(if $(CONFIG),--config $(CONFIG)) $(if $(GAINS),--gains $(GAINS)) --out build/firmware
 
-flash: firmware
+# Never a table that nobody named: without CONFIG and GAINS the board gets what `make firmware` has built last.
+flash: $(if $(PORT),$(if $(CONFIG)$(GAINS),firmware))
 	@test -n "$(PORT)" || { echo "make flash: name the board's port: make flash PORT=/dev/ttyUSB0" >&2; exit 2; }
+	@test -s build/firmware/table.hex || { echo "make flash: nothing is built; run make firmware CONFIG=table.toml" >&2; exit 2; }
 	avrdude -p atmega328p -c arduino -P $(PORT) -b $(or $(BOOTLOADER_BAUD),115200) -D -U flash:w:build/firmware/table.hex:i
 
 mutants: $(VENV)/test.stamp

@@ -47,19 +47,19 @@ def parser() -> Parser:
 def _run(options: argparse.Namespace) -> int:
     config = load_config(options.config)
     built = build_firmware(config, gains=options.gains)
+    lines = figures(config, built)  # first: a firmware that does not run in time is not written
     elf, hexadecimal = options.out / "table.elf", options.out / "table.hex"
     options.out.mkdir(parents=True, exist_ok=True)
     with whole_file(elf) as partial:
         copyfile(built, partial)
     with whole_file(hexadecimal) as partial:
         _run_tool("avr-objcopy", "-O", "ihex", str(elf), str(partial))
-    for line in figures(config, elf):
-        print(line)
+    print(*lines, f"firmware: {elf}", sep="\n")
     return 0
 
 
 def figures(config: TableConfig, elf: Path) -> list[str]:
-    """Return the size of a firmware, and its longest tick with a busy line.
+    """Return the limits of a firmware, its size, and its longest tick with a busy line.
 
     The rate of the edges is the maximum, in both directions.
     """
@@ -67,11 +67,11 @@ def figures(config: TableConfig, elf: Path) -> list[str]:
     tick_cycles = CLOCK_HZ // config.control.tick_hz
     chip = run_edges(config, _TICKS, firmware=elf)
     return [
+        f"limits {config.limits.speed_deg_s:g} deg/s and {config.limits.acceleration_deg_s2:g} deg/s^2",
         f"flash {flash} of {FLASH_BYTES} bytes ({flash / FLASH_BYTES:.0%})",
         f"RAM {ram + chip.stack_bytes} of {RAM_BYTES} bytes ({(ram + chip.stack_bytes) / RAM_BYTES:.0%}), "
         f"{chip.stack_bytes} of them stack",
         f"longest tick {chip.longest_tick} of {tick_cycles} cycles ({chip.longest_tick / tick_cycles:.0%})",
-        f"firmware: {elf}",
     ]
 
 

@@ -152,7 +152,7 @@ def _first_error(printed: str) -> str:
 
 
 def _has_avr_libc() -> bool:
-    """Tell whether the start-up code of the controller is there: without it the compiler prints the bare name."""
+    """Return whether the start-up code of the controller is there: without it the compiler prints the bare name."""
     start = "crtatmega328p.o"
     asked = ["avr-gcc", "-mmcu=atmega328p", f"-print-file-name={start}"]
     printed = subprocess.run(asked, check=False, capture_output=True, text=True).stdout.strip()  # noqa: S603  # a compiler

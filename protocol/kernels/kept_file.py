@@ -122,7 +122,7 @@ def _seal(name: str, content: bytes) -> bytes:
 
 
 def is_own(status: os.stat_result) -> bool:
-    """Tell whether a file is a plain one that belongs to this user, and that no other user can write."""
+    """Return whether a file is a plain one that belongs to this user, and that no other user can write."""
     is_ours = not hasattr(os, "geteuid") or (status.st_uid == os.geteuid() and not status.st_mode & 0o022)
     return is_ours and stat.S_ISREG(status.st_mode)
 

@@ -1,5 +1,6 @@
 """`python -m tools.firmware` and `tools.firmware_header`: the firmware of a table, and its constants."""
 
+import subprocess
 from pathlib import Path
 from shutil import which
 
@@ -13,12 +14,14 @@ from tests.emulator.avr.toolchain_mark import needs_toolchain
 from tools.firmware import main
 from tools.firmware_header import main as header_main
 
+ROOT = Path(__file__).parents[2]
+
 
 @needs_toolchain
 def test_elf_and_hex_are_written_and_their_figures_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
-    assert printed.startswith("flash ")
+    assert printed.startswith("limits 40 deg/s and 100 deg/s^2\nflash ")
     assert "\nRAM " in printed
     assert "\nlongest tick " in printed
     flash = read_program((tmp_path / "table.elf").read_bytes()).flash
@@ -38,7 +41,25 @@ def test_a_missing_tool_is_named_in_one_line(
     (tmp_path / "avr-gcc").symlink_to(compiler)
     monkeypatch.setenv("PATH", str(tmp_path))
     assert main(["--out", str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err == ("firmware: avr-objcopy is not installed; install the package binutils-avr\n")
+    assert capsys.readouterr().err == ("firmware: avr-size is not installed; install the package binutils-avr\n")
+
+
+def make(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Ask make what it would run in a folder that is set up."""
+    for name in ("pyproject.toml", "constraints.txt", ".venv/demo.stamp", "build/firmware/table.hex"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text("built", encoding="ascii")
+    command = ["make", "-n", "-f", str(ROOT / "Makefile"), *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+
+
+@pytest.mark.skipif(which("make") is None, reason="make is not installed")
+def test_flashing_never_builds_a_table_that_was_not_named(tmp_path: Path) -> None:
+    plain = make(tmp_path, "flash", "PORT=p").stdout
+    named = make(tmp_path, "flash", "PORT=p", "CONFIG=table.toml").stdout
+    assert "tools.firmware" not in plain
+    assert "avrdude" in plain
+    assert named.index("tools.firmware --config table.toml") < named.index("avrdude")
 
 
 @needs_toolchain
