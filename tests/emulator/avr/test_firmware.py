@@ -1,5 +1,6 @@
 """The compiled firmware beside the emulator: equal duty at every tick, equal replies, in the time that there is."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from tools.lockstep import TABLES, Pair, configured, run_edges, run_lockstep, ru
 
 pytestmark = needs_toolchain
 
+PIN = re.compile(r"^ *\| *(P[A-D]\d(?:, P[A-D]\d)?) *\| *([AD]\d(?:, [AD]\d)?) *\|", re.MULTILINE)
 MOST_CYCLES = 12_000
 """Of a tick of 16 000."""
 
@@ -103,6 +105,18 @@ def test_the_latch_is_within_a_count_of_the_encoder_at_any_share_of_a_tick() -> 
         instant = before + share * (after.encoder_deg - before)
         assert abs(after.latched_deg - instant) * 512 <= 1.5
     assert after.encoder_deg - before > 10 / 512
+
+
+def pins_in(file: Path) -> set[tuple[str, str]]:
+    """Return the pins in a table of a file, each with its name on an Arduino board."""
+    rows = PIN.findall(file.read_text(encoding="utf-8"))
+    return {pair for pins, names in rows for pair in zip(pins.split(", "), names.split(", "), strict=True)}
+
+
+def test_the_page_wires_the_pins_of_the_board() -> None:
+    wired = pins_in(Path(__file__).parents[3] / "docs" / "build-a-table.md")
+    assert len(wired) == 7
+    assert wired == pins_in(FIRMWARE / "board.h")
 
 
 def planted(folder: Path, file: str, old: str, new: str) -> CompiledTable:
