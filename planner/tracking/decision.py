@@ -49,9 +49,11 @@ class Receding:
     name = RECEDING
 
     def accelerations_deg_s2(self, window: Window, speed_deg_s: float) -> FloatArray:
-        """Return accelerations over the whole range, those next to zero first."""
-        limit = window.terms.acceleration_limit_deg_s2
-        trials = np.linspace(-limit, limit, TRIALS)
+        """Return 0 and accelerations over the range that both limits leave, those next to zero first."""
+        terms = window.terms
+        limit, ways = terms.acceleration_limit_deg_s2, np.array((-terms.speed_limit_deg_s, terms.speed_limit_deg_s))
+        low, high = np.clip((ways - speed_deg_s) / terms.step_s, -limit, limit)
+        trials = np.append(0.0, np.linspace(low, high, TRIALS - 1))
         trials = trials[np.argsort(np.abs(trials), kind="stable")]
         return np.concatenate((trials, _brakings(window, speed_deg_s)))
 

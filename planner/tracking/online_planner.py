@@ -199,6 +199,9 @@ class OnlinePlanner:
         candidates = safe_candidates(
             self._method, self.revealed.online, window, self.state.angle_deg, self.state.speed_deg_s, self._margin_deg
         )
+        if self._arm is not None:
+            # In a halt the table turns under an arm that stands, and the map rates only an arm that follows the table.
+            candidates = (each for each in candidates if each.braking_steps != HALT)
         for _, candidate in zip(range(_ARM_TRIALS), candidates, strict=False):
             path = self._followed(self._path_of(candidate, window.terms.step_s))
             if path is not None:

@@ -4,9 +4,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from planner.arrays import FloatArray
 from planner.map.config_map import ConfigurationMap, map_value
 from planner.table.motion import Limits
 from planner.tracking.decision import Method, Receding, costs_of_starts
+from planner.tracking.followed_arm import FollowedArm
 from planner.tracking.online_planner import Blocked, Kind, OnlinePlanner, State, Step, may_rest
 from planner.tracking.revealed_map import RevealedMap
 from protocol.trapezoid import MotionCommand, ReferenceState, advance, time_to_rest_s
@@ -17,7 +19,12 @@ SUB_STEPS = 16
 
 
 def begun(
-    map_: ConfigurationMap, view: int, method: Method | None = None, limits: Limits | None = None, resume: int = 3
+    map_: ConfigurationMap,
+    view: int,
+    method: Method | None = None,
+    limits: Limits | None = None,
+    resume: int = 3,
+    arm: FollowedArm | None = None,
 ) -> OnlinePlanner | None:
     """Return a planner whose table rests at the first location, with only that known; None where it cannot rest."""
     revealed = RevealedMap(map_.angle_count, STEP_S, limits or Limits(), None, view)
@@ -27,8 +34,14 @@ def begun(
     starts = [angle for angle in order.tolist() if may_rest(window.terms, 0, angle, MARGIN_DEG)]
     if not starts:
         return None
-    start = State(0, starts[0], 0.0)
-    return OnlinePlanner(revealed, method or Receding(), start, MARGIN_DEG, min(resume, view))
+    start = State(0, starts[0], 0.0, None if arm is None else np.zeros(6))
+    goals = None if arm is None else no_goals
+    return OnlinePlanner(revealed, method or Receding(), start, MARGIN_DEG, min(resume, view), arm, goals)
+
+
+def no_goals(first: int, last: int) -> FloatArray:
+    """Return goals for an arm that needs none."""
+    return np.tile(np.eye(4), (last - first + 1, 1, 1))
 
 
 def tracked(

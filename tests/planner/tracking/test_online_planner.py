@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planner.arrays import FloatArray
 from planner.map.config_map import ConfigurationMap
 from planner.map.synthetic_maps import MapFamily, blocks_map, synthetic_map
 from planner.planning.dynamic_programming import dynamic_programming
@@ -14,7 +15,8 @@ from planner.plans.plan import Pause, Plan, path_cost
 from planner.plans.problem import Problem
 from planner.table.motion import Limits
 from planner.tracking.decision import Method, RayShooting, Receding
-from planner.tracking.online_planner import Blocked, Kind, OnlinePlanner, Step, Why
+from planner.tracking.followed_arm import FollowedArm
+from planner.tracking.online_planner import Blocked, KeptStep, Kind, OnlinePlanner, Step, Why
 from planner.tracking.revealed_map import WindowError
 from tests.planner.tracking.online_examples import STEP_S, begun, faults, tracked
 
@@ -117,6 +119,39 @@ def test_in_a_corridor_too_fast_to_brake_along_the_table_halts_at_a_location_whe
     assert steps[-1].end == steps[-1].start._replace(speed_deg_s=0.0)
     steps += tracked(planner, map_, lambda _: 99)[0]
     assert planner.is_finished
+    assert [fault for step in steps for fault in faults(map_, step)] == []
+
+
+class WillingArm(FollowedArm):
+    """An arm that follows any table."""
+
+    def __init__(self) -> None:
+        pass
+
+    def follow(self, joints: FloatArray, T_TF: FloatArray, angles_deg: FloatArray) -> FloatArray:
+        assert len(T_TF) == len(angles_deg)
+        return np.tile(joints, (len(T_TF), 1))
+
+    def arrive(self, T_TF: FloatArray, angle_deg: float, before: FloatArray | None = None) -> FloatArray:
+        assert T_TF.shape == (4, 4)
+        assert np.isfinite(angle_deg)
+        return np.zeros(6) if before is None else before
+
+
+def test_with_an_arm_the_table_never_halts_since_it_would_turn_under_an_arm_that_stands() -> None:
+    map_ = corridor()
+    planner = begun(map_, 12, Receding(), arm=WillingArm())
+    assert planner is not None
+    kept: list[KeptStep] = []
+    steps: list[Step] = []
+    for _ in range(200):
+        steps += tracked(planner, map_, lambda _: 99, ticks=1)[0]
+        kept += planner.kept
+        if planner.is_finished:
+            break
+    assert planner.is_finished
+    assert kept
+    assert not any(each.halts for each in kept)
     assert [fault for step in steps for fault in faults(map_, step)] == []
 
 
