@@ -99,19 +99,20 @@ def _draw_line(axes: Axes, view: View, depths_mm: FloatArray, line: FloatArray, 
 
 @styled()
 def coverage_steps_figure(scanned: AdaptiveScanned) -> Figure:
-    """Return the share of what can be seen after each strip."""
+    """Return the share of what can be seen after each strip; of the whole surface where that is not known."""
     figure = new_figure(3.0)
     axes = figure.subplots()
     shares = np.array(scanned.seen_after) / max(1, int(scanned.visible.sum()))
     first = int(scanned.path is None)
     numbers = np.arange(first, first + len(shares))
     axes.bar(numbers, shares, color=[SKY if scanned.path is not None and n == 0 else BLUE for n in numbers], width=0.7)
-    if scanned.wanted > 0.0:
-        axes.axhline(scanned.wanted, **LIMIT)
-        axes.annotate(f"wanted {scanned.wanted:.1%}", (numbers[0] - 0.4, scanned.wanted), va="bottom", color=GREEN)
+    wanted = scanned.adapt.share
+    if wanted > 0.0 and scanned.knows_visible:
+        axes.axhline(wanted, **LIMIT)
+        axes.annotate(f"wanted {wanted:.1%}", (numbers[0] - 0.4, wanted), va="bottom", color=GREEN)
     axes.set_ylim(0.0, 1.08)
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("strip" if scanned.path is None else "strip (0: the predefined path)")
-    axes.set_ylabel("seen of what can be seen")
+    axes.set_ylabel("seen of what can be seen" if scanned.knows_visible else "seen of the whole surface")
     return figure

@@ -20,25 +20,33 @@ _MM2 = 100.0
 def adaptive_verdict(scanned: AdaptiveScanned) -> str:
     """Return what an adaptive scan came to in one sentence or two."""
     text = (
-        f"{scanned.share_of_visible:.1%} of what can be seen, {scanned.share_of_whole:.1%} of the whole surface, with"
+        f"{_of_visible(scanned)}{scanned.share_of_whole:.1%} of the whole surface, with"
         f" {counted(len(scanned.strips), 'strip')}{' after the path' if scanned.path is not None else ''};"
         f" the session takes {scanned.duration_s:.0f} s."
     )
     failed = [n for n, strip in enumerate(scanned.strips, 1) if not strip.verification.is_verified]
     if scanned.session.failure is not None:
         text += f" It ended early: {scanned.session.failure}."
-    elif scanned.share_of_visible < scanned.wanted - 1e-9:
-        text += f" Wanted were {scanned.wanted:.1%}: {_why_less(scanned)}."
+    elif not scanned.has_wanted_share:
+        text += f" Wanted were {scanned.adapt.share:.1%}: {_why_less(scanned)}."
+    if not scanned.knows_visible:
+        text += " What can be seen was not computed."
     if failed:
         text += f" Strip {failed[0]} {scanned.strips[failed[0] - 1].verification.verdict}."
     return text
 
 
+def _of_visible(scanned: AdaptiveScanned) -> str:
+    return f"{scanned.share_of_visible:.1%} of what can be seen, " if scanned.knows_visible else ""
+
+
 def _why_less(scanned: AdaptiveScanned) -> str:
+    if len(scanned.strips) >= scanned.adapt.most_strips:
+        return "all strips that were allowed are scanned (--most-strips)"
     refused = sum(step.refusal is not None for step in scanned.session.steps)
     if refused:
         return f"{counted(refused, 'strip')} could not be carried out, and no others see what is left"
-    return "all strips that were allowed are scanned (--most-strips)"
+    return "no other strip was found that sees more"
 
 
 def adaptive_report(scanned: AdaptiveScanned, origin: Origin | None = None) -> str:
@@ -53,7 +61,7 @@ def adaptive_report(scanned: AdaptiveScanned, origin: Origin | None = None) -> s
         ),
         figure(
             svg_of(coverage_steps_figure(scanned)),
-            f"Coverage strip by strip: {scanned.share_of_visible:.1%} of what can be seen in the end.",
+            f"Coverage strip by strip: {_of_visible(scanned)}{scanned.share_of_whole:.1%} of the whole in the end.",
         ),
         table(
             ("strip", "of what can be seen", "of the whole", "table (deg)", "way (s)", "motion (s)", "off its plan"),
@@ -82,7 +90,10 @@ def adaptive_report(scanned: AdaptiveScanned, origin: Origin | None = None) -> s
 
 def _strips(scanned: AdaptiveScanned) -> Iterator[tuple[Cell, ...]]:
     visible = max(1, int(scanned.visible.sum()))
-    shares = [(f"{seen / visible:.1%}", f"{seen / scanned.places:.1%}") for seen in scanned.seen_after]
+    shares = [
+        (f"{seen / visible:.1%}" if scanned.knows_visible else "", f"{seen / scanned.places:.1%}")
+        for seen in scanned.seen_after
+    ]
     if scanned.path is not None:
         motion = scanned.path.motion()
         way = f"{motion.start_deg:.0f} to {scanned.path.plan.angles_deg[-1]:.0f}"
@@ -117,24 +128,28 @@ def _regions(scanned: AdaptiveScanned) -> Iterator[tuple[Cell, ...]]:
     for number, region in enumerate(scanned.regions[:_REGIONS], 1):
         middle = ", ".join(f"{value:.0f}" for value in region.center_W)
         yield (
-            str(number), f"{region.area_mm2 / _MM2:.2f}", f"{region.can_be_seen_mm2 / _MM2:.2f}", middle,
+            str(number), f"{region.area_mm2 / _MM2:.2f}", _can_be_seen(scanned, region.can_be_seen_mm2), middle,
             REASONS[region.reason],
         )  # fmt: skip
     rest = scanned.regions[_REGIONS:]
     if rest:
-        area, visible = (
-            sum(each) / _MM2 for each in zip(*((r.area_mm2, r.can_be_seen_mm2) for r in rest), strict=True)
+        area_mm2, visible_mm2 = (
+            sum(each) for each in zip(*((r.area_mm2, r.can_be_seen_mm2) for r in rest), strict=True)
         )
-        yield f"{len(rest)} smaller ones", f"{area:.2f}", f"{visible:.2f}", "", ""
+        yield f"{len(rest)} smaller ones", f"{area_mm2 / _MM2:.2f}", _can_be_seen(scanned, visible_mm2), "", ""
+
+
+def _can_be_seen(scanned: AdaptiveScanned, area_mm2: float) -> str:
+    return f"{area_mm2 / _MM2:.2f}" if scanned.knows_visible else ""
 
 
 def adaptive_document(scanned: AdaptiveScanned) -> dict[str, Any]:
     """Return the strips as part of `scan.json`; lengths in mm, areas in mm2, angles in deg, times in s."""
     return {
-        "wanted": scanned.wanted,
-        "seen_of_visible": scanned.share_of_visible,
+        "wanted": scanned.adapt.share,
+        "seen_of_visible": scanned.share_of_visible if scanned.knows_visible else None,
         "seen_of_whole": scanned.share_of_whole,
-        "visible_of_whole": float(scanned.visible.mean()),
+        "visible_of_whole": float(scanned.visible.mean()) if scanned.knows_visible else None,
         "duration_s": scanned.duration_s,
         "path": scanned.path is not None,
         "strips": [
@@ -158,7 +173,7 @@ def adaptive_document(scanned: AdaptiveScanned) -> dict[str, Any]:
         "unseen": [
             {
                 "area_mm2": region.area_mm2,
-                "can_be_seen_mm2": region.can_be_seen_mm2,
+                "can_be_seen_mm2": region.can_be_seen_mm2 if scanned.knows_visible else None,
                 "center_W": region.center_W.tolist(),
                 "reason": region.reason.name.lower(),
             }

@@ -1,6 +1,7 @@
 """A session of adaptive scanning from end to end: the predefined path if there is one, then strip after strip."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -8,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.adaptive.known_part import KnownPart
-from planner.adaptive.policy import Policy, Returned
+from planner.adaptive.policy import Policy, PolicyError, Returned
 from planner.adaptive.session import Session, run_session
 from planner.adaptive.surroundings import Surroundings
 from planner.adaptive.table_carrier import ScannedStrip, TableCarrier
 from planner.adaptive.transfer import Transfer
 from planner.adaptive.unknown_part import UnknownPart, survey
 from planner.adaptive.unseen_regions import Region, unseen_regions
+from planner.adaptive.visibility import Places, at_nearest
 from planner.arrays import BoolArray, IndexArray
 from planner.cell.obstacles import workpiece_obstacle
 from planner.cell.scan import Scan
@@ -71,8 +73,9 @@ class AdaptiveScanned:
         strips: Those that were scanned.
         path: The predefined path; None where there was none.
         draws_back: The way to a clear posture at the end.
-        wanted: The share of what can be seen that was wanted.
-        visible: `(m,)` which places of the coverage can be seen.
+        adapt: What was wanted.
+        visible: `(m,)` which places of the coverage can be seen; all where that is not known.
+        knows_visible: Whether what can be seen was computed: not where the session ended before that.
         first_seen: `(m,)` the motion that saw each place first, counted from 0, the path included; -1 for none.
         regions: What was not seen.
     """
@@ -82,8 +85,9 @@ class AdaptiveScanned:
     strips: tuple[ScannedStrip, ...]
     path: RunInput | None
     draws_back: Transfer | None
-    wanted: float
+    adapt: AdaptOptions
     visible: BoolArray
+    knows_visible: bool
     first_seen: IndexArray
     regions: list[Region]
 
@@ -110,12 +114,18 @@ class AdaptiveScanned:
         return self.seen_after[-1] / max(1, int(self.visible.sum()))
 
     @property
+    def has_wanted_share(self) -> bool:
+        """Whether the wanted share was seen."""
+        return self.share_of_visible >= self.adapt.share - 1e-9
+
+    @property
     def has_succeeded(self) -> bool:
         """Whether the wanted share was seen, and every strip was verified."""
         return (
             self.scanned.is_whole
             and self.session.failure is None
-            and self.share_of_visible >= self.wanted - 1e-9
+            and self.knows_visible
+            and self.has_wanted_share
             and all(strip.verification.is_verified for strip in self.strips)
         )
 
@@ -187,8 +197,10 @@ def scan_adaptively(
     probe = probe_of(scan, options)
     knowledge = Knowledge.of(scan, probe, options.exact_calibration, options.seed)
     policy, surveyed = _policy(known, probe, options, adapt, progress)
-    to_plan = surveyed or scan
-    path = planned_scan(to_plan, options.configuration, options.angle_count, progress) if to_plan.has_path else None
+    if surveyed is not None:
+        path = _survey_path(surveyed, options, progress)
+    else:
+        path = planned_scan(scan, options.configuration, options.angle_count, progress) if scan.has_path else None
     if path is not None:
         check_motion(path, options)
     else:
@@ -202,7 +214,7 @@ def scan_adaptively(
             policy, carrier, adapt.most_strips, say,
             None if path is None else lambda: carrier.scan_path(path, progress("motion")),
         )  # fmt: skip
-        draws_back = carrier.draw_back(policy.solid())
+        session, draws_back = _drawn_back(session, carrier, policy)
     if not cloud.runs:
         (out / CLOUD_FILE).unlink()
         (out / XYZ_FILE).unlink(missing_ok=True)
@@ -212,12 +224,27 @@ def scan_adaptively(
         scan, options, probe, path or carrier.scanned[0].plan.planned, knowledge, joined(cloud.runs), work,
         ply.count, _worst(cloud.dead_lines), is_whole, out,
     )  # fmt: skip
-    visible = _visible(policy, known, probe, options, adapt, progress) | (work.coverage.codes == Sight.SEEN)
+    found = _visible(policy, session, scan, probe, options, adapt, progress)
+    visible = np.ones(len(work.coverage.codes), dtype=np.bool_)
+    if found is not None:
+        visible = at_nearest(found.visible, Places.of(found.coverage), Places.of(work.coverage)) | (
+            work.coverage.codes == Sight.SEEN
+        )
     regions = unseen_regions(work.coverage, visible, float(scan.mesh.area))
     return AdaptiveScanned(
-        scanned, session, tuple(carrier.scanned), path, draws_back, adapt.share, visible, cloud.first_seen,
-        regions,
+        scanned, session, tuple(carrier.scanned), path, draws_back, adapt, visible, found is not None,
+        cloud.first_seen, regions,
     )  # fmt: skip
+
+
+def _drawn_back(session: Session, carrier: TableCarrier, policy: Policy) -> tuple[Session, Transfer | None]:
+    """Return the session, which Ctrl-C can end here too, and the way to a clear posture."""
+    if session.contradicts:
+        return session, None  # what the policy takes for free may not be
+    try:
+        return session, carrier.draw_back(policy.solid())
+    except KeyboardInterrupt:
+        return session._replace(failure=session.failure or "interrupted"), None
 
 
 def _policy(
@@ -227,19 +254,42 @@ def _policy(
     if adapt.bounds is None:
         return _known_part(known, probe, options, adapt, progress), None
     speed_mm_s = _DENSITY * COVERED_MM * options.triggers.rate_hz
-    policy = UnknownPart(Surroundings.of(known), probe, adapt.bounds, speed_mm_s)
-    return policy, survey(known, adapt.bounds, speed_mm_s)
+    surveyed = survey(known, adapt.bounds, speed_mm_s)  # first: it refuses a cylinder that the table does not hold
+    return UnknownPart(Surroundings.of(known), probe, adapt.bounds, speed_mm_s), surveyed
+
+
+def _survey_path(surveyed: Scan, options: ScanOptions, progress: ProgressOf) -> RunInput | None:
+    """Return the motion of the survey; None where the arm cannot make it, as beside a flat part: then strips begin."""
+    try:
+        return planned_scan(surveyed, options.configuration, options.angle_count, progress)
+    except ScanError:
+        return None
 
 
 def _visible(
-    policy: Policy, known: Scan, probe: LaserProbe, options: ScanOptions, adapt: AdaptOptions, progress: ProgressOf
-) -> BoolArray:
-    """Return which places can be seen; after a session without the mesh, only the report asks for it."""
+    policy: Policy,
+    session: Session,
+    scan: Scan,
+    probe: LaserProbe,
+    options: ScanOptions,
+    adapt: AdaptOptions,
+    progress: ProgressOf,
+) -> KnownPart | None:
+    """Return who knows which places can be seen; None where that was not computed when the session ended.
+
+    After a session without the mesh, only the report asks for it: then the true part answers.
+    """
     if isinstance(policy, KnownPart):
-        return policy.visible
-    judge = _known_part(known, probe, options, adapt._replace(share=1.0), progress)
-    judge.next_strips()
-    return judge.visible
+        return policy if policy.has_looked else None
+    if session.failure is not None:
+        return None
+    try:
+        judge = _known_part(scan, probe, options, adapt._replace(share=1.0), progress)
+        with suppress(PolicyError):
+            judge.next_strips()
+    except KeyboardInterrupt:
+        return None
+    return judge
 
 
 def _known_part(

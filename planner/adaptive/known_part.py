@@ -89,6 +89,7 @@ class KnownPart:
         self._places = Places(self.coverage.points, self.coverage.normals)
         self._candidates: Candidates | None = None
         self._is_open: BoolArray = np.zeros(0, dtype=np.bool_)
+        self._is_scanned: BoolArray = np.zeros(0, dtype=np.bool_)
         self._numbers: dict[str, int] = {}
 
     @property
@@ -103,10 +104,18 @@ class KnownPart:
 
     @property
     def sees(self) -> BoolArray:
-        """`(n, m)` which of the candidates that are left see which places; none before strips were asked for."""
+        """`(n, m)` which of the candidates see which places; none before strips were asked for.
+
+        Those that were scanned are left out: what they see is known. One that could not be carried out still counts.
+        """
         if self._candidates is None:
             return np.zeros((0, len(self._places.points)), dtype=np.bool_)
-        return self._candidates.sees[self._is_open]
+        return self._candidates.sees[~self._is_scanned]
+
+    @property
+    def has_looked(self) -> bool:
+        """Whether it was asked for strips, and so knows what can be seen."""
+        return self._candidates is not None
 
     @property
     def wanted(self) -> int:
@@ -118,6 +127,7 @@ class KnownPart:
         if self._candidates is None:
             self._candidates = self._made()
             self._is_open = np.ones(len(self._candidates.strips), dtype=np.bool_)
+            self._is_scanned = ~self._is_open
         if not self.visible.any():
             raise PolicyError(f"{self._surroundings.name}: nothing of the part can be reached; {_NEXT_STEP}")
         if int(self.seen.sum()) >= self.wanted:
@@ -132,6 +142,7 @@ class KnownPart:
         if strip is not None:
             self._left -= 1
             self._close(strip)
+            self._is_scanned[self._numbers[strip.name]] = True
         self._check_fit(strip, returned.points_W)
 
     def refuse(self, strip: Strip, reason: str) -> None:  # noqa: ARG002 - any reason closes it

@@ -24,6 +24,7 @@ from planner.kinematics.configuration import Configuration
 from planner.planning.planners import PLANNERS
 from planner.scanning.latched_run import LatchedRun
 from planner.scanning.scan_run import ScanOptions, TableAtPort, check_motion, run_on_table
+from protocol import TableError
 from protocol.program.progress import Progress
 from protocol.trapezoid import MotionCommand, ReferenceState, time_to_rest_s
 
@@ -99,7 +100,7 @@ class TableCarrier:
         return [*directed, *(strip for k, strip in enumerate(strips) if k not in able)]
 
     def scan(self, strip: Strip, solid: Obstacle) -> Returned | str:
-        """Scan one strip, and return what the probe returned, or why it cannot be scanned."""
+        """Scan one strip, and return what the probe returned, or why it cannot be scanned; see `Carrier`."""
         planned = self._planned(strip, solid)
         if isinstance(planned, str):
             return planned
@@ -110,9 +111,13 @@ class TableCarrier:
             return transfer
         try:
             check_motion(planned.planned, self._options)
-            run = run_on_table(self._table, planned.planned, self._options, None)
         except PlannerError as error:
             return str(error)
+        try:
+            run = run_on_table(self._table, planned.planned, self._options, None)
+        except (PlannerError, TableError) as error:
+            # The table may have moved, and where it stands is not known: no way from there can be checked.
+            raise CarrierError(f"{strip.name}: {error}") from error
         self._stand_at(end)
         self.scanned.append(ScannedStrip(planned, transfer, run, verified(planned.planned, run.record)))
         returned = self._measure(planned.planned, run)

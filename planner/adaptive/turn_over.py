@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from scipy.spatial import cKDTree
 
 from planner.adaptive.adaptive_scan import AdaptiveScanned, AdaptOptions, scan_adaptively
 from planner.adaptive.other_face import other_face
 from planner.adaptive.registration import Joined, join
 from planner.adaptive.registration_cloud import Cloud
-from planner.adaptive.visibility import Places
+from planner.adaptive.visibility import Places, at_nearest
 from planner.arrays import BoolArray, FloatArray
 from planner.cell.cell import placement
 from planner.cell.scan import Scan, check_it_fits_the_table
@@ -66,6 +65,7 @@ class TurnedOver:
 def scan_turned_over(
     first: AdaptiveScanned,
     scan: Scan,
+    known: Scan,
     options: ScanOptions,
     adapt: AdaptOptions,
     out: Path,
@@ -77,6 +77,7 @@ def scan_turned_over(
     Args:
         first: The scan of the part as it stood, whose results are in `out`.
         scan: What was scanned.
+        known: The same with the mesh that the face and the strips are chosen by.
         options: How it is scanned.
         adapt: What is wanted.
         out: Where the joined cloud is written; the second scan goes to its subfolder.
@@ -90,8 +91,8 @@ def scan_turned_over(
     """
     coverage = first.scanned.coverage
     unseen = Places(coverage.points[~first.visible], coverage.normals[~first.visible])
-    T_21 = other_face(scan.mesh, unseen)
-    turned, laid = _moved(scan, T_21), _moved(scan, _by_hand(options.seed) @ T_21)
+    T_21 = other_face(known.mesh, unseen)
+    turned, laid = _moved(known, T_21), _moved(scan, _by_hand(options.seed) @ T_21)
     check_it_fits_the_table(turned.mesh, scan.cell)
     alone = options._replace(normals=False, surface=None)
     second = scan_adaptively(laid, alone, adapt, out / TURNED_FOLDER, progress, say, turned)
@@ -177,11 +178,13 @@ def _mean_mm(mesh: trimesh.Trimesh, points: FloatArray) -> float:
 
 def _in_either(first: AdaptiveScanned, second: AdaptiveScanned, T_12: FloatArray) -> tuple[BoolArray, BoolArray]:
     """Return which places of the first coverage were seen, and which can be, in either placement."""
-    there = second.scanned.coverage
-    points = there.points @ T_12[:3, :3].T + T_12[:3, 3]
-    _, nearest = cKDTree(points).query(first.scanned.coverage.points)
-    seen = (first.scanned.coverage.codes == Sight.SEEN) | (there.codes == Sight.SEEN)[nearest]
-    return seen, first.visible | second.visible[nearest] | seen
+    there, here = second.scanned.coverage, first.scanned.coverage
+    places = Places(there.points @ T_12[:3, :3].T + T_12[:3, 3], there.normals @ T_12[:3, :3].T)
+    seen, visible = (
+        at_nearest(flags, places, Places.of(here)) for flags in (there.codes == Sight.SEEN, second.visible)
+    )
+    seen |= here.codes == Sight.SEEN
+    return seen, first.visible | visible | seen
 
 
 def _write(file: Path, name: str, *clouds: tuple[FloatArray, FloatArray]) -> None:

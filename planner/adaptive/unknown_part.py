@@ -206,11 +206,12 @@ class UnknownPart:
         x, y, z = (points - bounds.middle_mm).T
         aside_mm = float(np.hypot(x, y).max(initial=0.0)) - 0.5 * bounds.diameter_mm
         above_mm = float(z.max(initial=0.0)) - bounds.height_mm
-        if max(aside_mm, above_mm) > _BEYOND_MM:
-            where = f"{aside_mm:.1f} mm beside" if aside_mm > above_mm else f"{above_mm:.1f} mm above"
+        below_mm = -float(z.min(initial=0.0))
+        beyond_mm, side = max((aside_mm, "beside"), (above_mm, "above"), (below_mm, "below"))
+        if beyond_mm > _BEYOND_MM:
             raise PolicyError(
-                f"the probe sees surface {where} the bounding cylinder of {bounds.diameter_mm:g} x"
-                f" {bounds.height_mm:g} mm; give a larger one"
+                f"the probe sees surface {beyond_mm:.1f} mm {side} the bounding cylinder of {bounds.diameter_mm:g} x"
+                f" {bounds.height_mm:g} mm, which stands on z = 0; give a larger one, or move the part"
             )
 
 

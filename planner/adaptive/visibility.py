@@ -8,13 +8,15 @@ margin, so that what is promised here is also measured.
 
 from dataclasses import dataclass, replace
 from math import sqrt
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from planner.arrays import BoolArray, FloatArray, IndexArray
 from planner.geometry.ray_casting import RayCaster
 from planner.kernel import kernel
+from planner.scanning.coverage import Coverage
 from planner.scanning.probe import LaserProbe, Sight, sight
 
 # Pairs of strip and place whose rays are cast at once, which bounds the memory.
@@ -23,6 +25,8 @@ _BLOCK = 200_000
 _RANGE_MARGIN_MM = 1.0
 _INCIDENCE_MARGIN_DEG = 1.0
 _WIDTH_MARGIN = 0.98
+# Places whose normals are at right angles count as farther apart by 1.4 times this.
+_SIDE_MM = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +44,24 @@ class Places:
     def only(self, chosen: BoolArray | IndexArray) -> "Places":
         """Return some of the places."""
         return Places(self.points[chosen], self.normals[chosen])
+
+    @classmethod
+    def of(cls, coverage: Coverage) -> Self:
+        """Return the places by which a coverage knows its surface."""
+        return cls(coverage.points, coverage.normals)
+
+
+def at_nearest(flags: BoolArray, places: Places, others: Places) -> BoolArray:
+    """Return for each of `n` other places the flag of the nearest of `m` places on the same side of the part.
+
+    Args:
+        flags: `(m,)`, one for each of the places.
+        places: On a surface.
+        others: On about the same surface; the samples of two meshes are not the same even where these agree.
+    """
+    tree = cKDTree(np.hstack((places.points, _SIDE_MM * places.normals)))
+    nearest = tree.query(np.hstack((others.points, _SIDE_MM * others.normals)))[1]
+    return np.asarray(flags[nearest])
 
 
 def cautious(probe: LaserProbe) -> LaserProbe:

@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from planner.adaptive.adaptive_report import adaptive_document, adaptive_report, adaptive_summary
+from planner.adaptive.adaptive_report import adaptive_document, adaptive_report, adaptive_summary, adaptive_verdict
 from planner.adaptive.adaptive_scan import AdaptOptions, scan_adaptively
 from planner.adaptive.turn_over import (
     JOINED_FILE,
@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
         need("small_gicp")
         if arguments.blind is not None:
             raise PlannerError("--turn-over: the other face is chosen by the mesh; leave out --blind")
-        set_aside(arguments.out / TURNED_FOLDER, SCAN_RESULTS)
+    set_aside(arguments.out / TURNED_FOLDER, SCAN_RESULTS)
     set_aside(arguments.out, SCAN_RESULTS, keep=() if arguments.mesh is None else (arguments.mesh,))
     progress = progress_line("mesh", sys.stderr)
     scan = known = load_scan(arguments.scan, options.say, progress)
@@ -103,7 +103,7 @@ def _adaptive(scan: Scan, known: Scan, asked: ScanOptions, arguments: argparse.N
     sys.stdout.write(summary(found.scanned) + adaptive_summary(found))
     is_turned = True
     if arguments.turn_over and found.session.failure is None:
-        turned = scan_turned_over(found, scan, asked, wanted, out, _progress_of, _show_strips)
+        turned = scan_turned_over(found, scan, known, asked, wanted, out, _progress_of, _show_strips)
         is_turned = _write_turned_over(turned, document, out, origin)
     if found.session.contradicts:
         raise PlannerError(f"{found.session.failure}; what was scanned is in {out}")
@@ -119,6 +119,8 @@ def _write_turned_over(turned: TurnedOver, document: dict[str, Any], out: Path, 
     write_whole(second / REPORT_FILE, adaptive_report(turned.second, origin))
     save_scan(out / "scan.json", document | {"turned_over": turned_over_document(turned)})
     sys.stdout.write(turned_over_summary(turned))
+    if not turned.second.has_succeeded:
+        sys.stdout.write(f"           turned over: {adaptive_verdict(turned.second)}\n")
     return turned.second.has_succeeded and not isinstance(turned.joined, str)
 
 

@@ -39,15 +39,17 @@ class RayCaster:
     """
 
     def __init__(self, mesh: trimesh.Trimesh) -> None:
-        """Store a mesh in mm."""
+        """Store a mesh in mm; no ray hits one without triangles."""
         triangles = np.asarray(mesh.triangles, dtype=np.float64)
         across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         doubled_area = np.linalg.norm(across, axis=1, keepdims=True)
         self.normals: FloatArray = np.divide(across, doubled_area, out=np.zeros_like(across), where=doubled_area > 0.0)
         self._offsets_mm = np.einsum("ij,ij->i", self.normals, triangles[:, 0])
         # Relative to the middle of the part, coordinates are smallest and single precision is finest.
-        self._middle_mm = np.asarray(mesh.bounds, dtype=np.float64).mean(axis=0)
+        self._middle_mm = np.zeros(3) if not len(triangles) else np.asarray(mesh.bounds, dtype=np.float64).mean(axis=0)
         self._scene = EmbreeScene(robust=True)
+        if not len(triangles):
+            return
         vertices = np.asarray(mesh.vertices, dtype=np.float64) - self._middle_mm
         TriangleMesh(self._scene, vertices.astype(np.float32), np.asarray(mesh.faces, dtype=np.int32))
 

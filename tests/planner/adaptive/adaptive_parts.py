@@ -37,3 +37,12 @@ def cup(depth_mm: float = 70.0) -> trimesh.Trimesh:
     mesh = trimesh.creation.revolve(outline, sections=48)
     assert isinstance(mesh, trimesh.Trimesh)
     return mesh
+
+
+def lump(scale: float = 1.0) -> trimesh.Trimesh:
+    """A convex part of few faces that no turn brings onto itself; it stands on z = 0."""
+    corners = np.random.default_rng(4).uniform(-1.0, 1.0, (14, 3)) * (38.0, 30.0, 32.0)
+    mesh: trimesh.Trimesh = trimesh.convex.convex_hull(scale * corners)
+    pose = trimesh.poses.compute_stable_poses(mesh)[0][0]
+    mesh.apply_transform(pose)
+    return mesh
