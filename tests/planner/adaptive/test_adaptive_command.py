@@ -8,11 +8,15 @@ import trimesh
 
 import emulator  # noqa: F401 - teaches pyserial the port emulator://
 from planner.__main__ import main
-from planner.adaptive import known_part
+from planner.adaptive import known_part, table_carrier
 from planner.adaptive.known_part import KnownPart
 from planner.adaptive.policy import Returned
 from planner.adaptive.strip import Strip
+from planner.adaptive.table_carrier import TableCarrier
+from planner.cell.obstacles import Obstacle
+from planner.scanning.latched_run import LatchedRun
 from planner.scanning.measuring import Measuring
+from protocol import TableError
 from tests.planner.adaptive.adaptive_parts import cup
 
 PART = """
@@ -188,3 +192,71 @@ def test_the_same_scan_gives_the_same_bytes(folder: Path) -> None:
         assert scan(folder, "part.toml", "--adapt", "0.1") == 0
         results.append([(folder / "out" / name).read_bytes() for name in ("cloud.ply", "scan.json", "poses.csv")])
     assert results[0] == results[1]
+
+
+def test_after_ctrl_c_on_the_path_no_share_of_what_can_be_seen_is_claimed(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(_self: KnownPart) -> list[Strip]:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(KnownPart, "next_strips", interrupted)
+    assert scan(folder, "rings.toml", "--adapt", "0.9") == 1
+    shown = capsys.readouterr().out
+    assert "What can be seen was not computed" in shown
+    assert "of what can be seen" not in shown
+    found = document(folder)["adaptive"]
+    assert (found["seen_of_visible"], found["visible_of_whole"]) == (None, None)
+    assert found["unseen"][0]["can_be_seen_mm2"] is None
+    assert found["seen_of_whole"] > 0.2
+
+
+def test_ctrl_c_on_the_way_back_keeps_the_report(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(_self: TableCarrier, _solid: Obstacle) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(TableCarrier, "draw_back", interrupted)
+    assert scan(folder, "part.toml", "--adapt", "0.1") == 1
+    assert "It ended early: interrupted" in (folder / "out" / "report.html").read_text()
+
+
+def test_strips_that_cannot_be_carried_out_are_no_success(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(table_carrier, "plan_strip", lambda *_: "a reason")
+    assert scan(folder, "rings.toml", "--adapt", "0.95") == 1
+    shown = capsys.readouterr().out
+    assert "could not be carried out, and no others see what is left" in shown
+    assert document(folder)["adaptive"]["seen_of_visible"] < 0.9
+
+
+def test_a_table_that_fails_in_the_second_strip_ends_the_session_and_the_first_is_kept(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run, runs = table_carrier.run_on_table, list[LatchedRun]()
+
+    def failing(*arguments: Any) -> LatchedRun:  # noqa: ANN401 - passed on
+        if runs:
+            raise TableError("no reply within 500 ms")
+        runs.append(run(*arguments))
+        return runs[0]
+
+    monkeypatch.setattr(table_carrier, "run_on_table", failing)
+    assert scan(folder, "part.toml", "--adapt", "0.8") == 1
+    assert "no reply within 500 ms" in capsys.readouterr().out
+    found = document(folder)
+    assert len(found["adaptive"]["strips"]) == 1
+    assert found["adaptive"]["refused"] == []
+    assert found["points"] > 1000
+
+
+def test_the_same_part_in_other_triangles_has_the_same_share_of_what_can_be_seen(folder: Path) -> None:
+    other = cup().subdivide()
+    other.faces = np.random.default_rng(0).permutation(np.asarray(other.faces))
+    other.export(folder / "other.stl")
+    shares = []
+    for more in ((), ("--mesh", str(folder / "other.stl"))):
+        assert scan(folder, "part.toml", "--adapt", "0.5", *more) == 0
+        found = document(folder)["adaptive"]
+        shares.append((found["seen_of_visible"], found["visible_of_whole"]))
+    assert shares[1] == pytest.approx(shares[0], abs=0.03)

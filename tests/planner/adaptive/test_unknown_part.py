@@ -99,6 +99,21 @@ def test_surface_beyond_the_cylinder_ends_it(bounds: Cylinder, words: str) -> No
         narrow.take(None, seen)
 
 
+def test_surface_below_the_cylinder_ends_it() -> None:
+    policy, held = surveyed(cup())
+    seen = held.sweep(survey(scan(), BOUNDS, 25.0).path.T_WS)
+    with pytest.raises(PolicyError, match="mm below the bounding cylinder"):
+        policy.take(None, seen._replace(points_W=seen.points_W - np.array((0.0, 0.0, 12.0))))
+
+
+def test_where_nothing_was_seen_it_looks_into_the_cylinder() -> None:
+    policy = UnknownPart(Surroundings.of(scan()), optics(), BOUNDS, 30.0)
+    strips = policy.next_strips()
+    assert strips
+    middles = [strip.T_WS[:, :3, 3] + 100.0 * strip.T_WS[:, :3, 2] for strip in strips]
+    assert all(np.hypot(*middle.mean(axis=0)[:2]) < 100.0 for middle in middles)
+
+
 def test_the_points_beyond_a_cylinder_that_is_too_small_are_kept() -> None:
     policy, held = surveyed(ball())
     returned = held.sweep(survey(scan(), BOUNDS, 25.0).path.T_WS)

@@ -3,7 +3,7 @@ import trimesh
 
 from planner.adaptive.candidates import POSES, directions, following, sweeps
 from planner.adaptive.reach import filled_up
-from planner.adaptive.visibility import Places, sees
+from planner.adaptive.visibility import Places, at_nearest, sees
 from planner.arrays import FloatArray
 from planner.cell.cell import Probe
 from planner.geometry.ray_casting import RayCaster
@@ -70,3 +70,14 @@ def test_a_strip_over_a_hollow_stays_over_its_rim() -> None:
     assert moved[0]
     np.testing.assert_allclose(heights[[0, 1, 3, 4]], 150.0, atol=1e-6)
     assert 110.0 < heights[2] < 120.0  # over the bottom the probe sinks, as steeply as a strip may
+
+
+def test_flags_go_over_to_other_samples_of_the_same_side() -> None:
+    """The plate is thinner than its samples are apart."""
+    plate = trimesh.creation.box((100.0, 100.0, 0.5))
+    coverage = Coverage(plate, RayCaster(plate), LaserProbe(), 2.0)
+    other = plate.subdivide()
+    points, triangles = trimesh.sample.sample_surface(other, 3000, seed=3)
+    others = Places(np.asarray(points), np.asarray(other.face_normals)[triangles])
+    flags = at_nearest(coverage.normals[:, 2] > 0.5, Places.of(coverage), others)
+    np.testing.assert_array_equal(flags, others.normals[:, 2] > 0.5)
