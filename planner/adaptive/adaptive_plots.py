@@ -39,10 +39,9 @@ def strips_figure(scanned: AdaptiveScanned) -> Figure:
         _, depths_mm = view.surface(caster)
         for number, strip in enumerate(scanned.strips, 1):
             _draw_line(axes, view, depths_mm, _middle_line(scanned, strip.plan.strip.T_WS, T_TW), number)
-    handles = [
-        mpl.patches.Patch(color=VERMILION, label="unseen"),
-        mpl.patches.Patch(color=PALE, label="cannot be seen"),
-    ]
+    handles = [mpl.patches.Patch(color=VERMILION, label="unseen")]
+    if scanned.knows_visible:
+        handles.append(mpl.patches.Patch(color=PALE, label="cannot be seen"))
     if scanned.path is not None:
         handles.insert(0, mpl.patches.Patch(color=SKY, label="seen along the path"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
@@ -112,7 +111,8 @@ def coverage_steps_figure(scanned: AdaptiveScanned) -> Figure:
         axes.annotate(f"wanted {wanted:.1%}", (numbers[0] - 0.4, wanted), va="bottom", color=GREEN)
     axes.set_ylim(0.0, 1.08)
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlim(numbers[0] - 0.8, numbers[-1] + 0.8)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.set_xlabel("strip" if scanned.path is None else "strip (0: the predefined path)")
     axes.set_ylabel("seen of what can be seen" if scanned.knows_visible else "seen of the whole surface")
     return figure

@@ -77,6 +77,8 @@ def adaptive_report(scanned: AdaptiveScanned, origin: Origin | None = None) -> s
         paragraph(
             "What can be seen is what was seen, and what any candidate strip that the arm can reach would see. The rest"
             " faces the table, lies too deep, or is out of the arm's reach as the part stands."
+            if scanned.knows_visible
+            else "The session ended before it was computed what of this some strip would see."
         ),
         table(
             ("region", "area (cm²)", "of it some strip would see (cm²)", "middle x, y, z (mm)", "why"),

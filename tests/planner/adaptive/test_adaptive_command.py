@@ -16,6 +16,7 @@ from planner.adaptive.table_carrier import TableCarrier
 from planner.cell.obstacles import Obstacle
 from planner.scanning.latched_run import LatchedRun
 from planner.scanning.measuring import Measuring
+from planner.scanning.scan_run import run_on_table
 from protocol import TableError
 from tests.planner.adaptive.adaptive_parts import cup
 
@@ -233,7 +234,7 @@ def test_strips_that_cannot_be_carried_out_are_no_success(
 def test_a_table_that_fails_in_the_second_strip_ends_the_session_and_the_first_is_kept(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run, runs = table_carrier.run_on_table, list[LatchedRun]()
+    run, runs = run_on_table, list[LatchedRun]()
 
     def failing(*arguments: Any) -> LatchedRun:  # noqa: ANN401 - passed on
         if runs:
