@@ -160,7 +160,7 @@ def fault_from(kind: object, given: Mapping[str, object]) -> Fault:
             given.
     """
     if not isinstance(kind, str) or kind not in KINDS:
-        raise FaultError(f"{shown(kind)} is not a fault; there are {', '.join(KINDS)}")
+        raise FaultError(f"{shown(kind)} is not a fault; allowed are {', '.join(KINDS)}")
     _check_numbers(kind, given)
     whole = {parameter.name: parameter.whole for parameter in parameters_of(kind)}
     values: dict[str, Any] = {

@@ -114,7 +114,7 @@ class KnownPart:
 
     @property
     def has_looked(self) -> bool:
-        """Whether it was asked for strips, and so knows what can be seen."""
+        """Whether it was asked for strips, and so has computed what can be seen."""
         return self._candidates is not None
 
     @property

@@ -47,7 +47,7 @@ class Places:
 
     @classmethod
     def of(cls, coverage: Coverage) -> Self:
-        """Return the places by which a coverage knows its surface."""
+        """Return the places that stand for the surface in a coverage."""
         return cls(coverage.points, coverage.normals)
 
 

@@ -8,7 +8,7 @@ import sys
 
 from protocol.program.progress import show_line
 
-_PACKAGES = ("emulator", "planner", "protocol", "tools")
+PACKAGES = ("emulator", "planner", "protocol", "tools")
 
 
 class _Lines(logging.StreamHandler):  # type: ignore[type-arg]  # generic for the type checker only
@@ -23,7 +23,7 @@ def log_to_stderr() -> None:
     """Write all messages of this project from now on, with the time in s since the start of the program."""
     lines = _Lines(sys.stderr)
     lines.setFormatter(_Formatter("%(seconds)9.3f s %(name)s: %(message)s"))
-    for package in _PACKAGES:
+    for package in PACKAGES:
         logger = logging.getLogger(package)
         logger.setLevel(logging.DEBUG)
         logger.handlers = [lines]

@@ -71,7 +71,7 @@ def test_going_round_a_workpiece_needs_the_table_to_turn(name: str) -> None:
             "overlap = 1.5",
             "path.overlap is 1.5; it must be a finite number at least 0 and at most 0.9",
         ),
-        ('"meridians"', '"zigzag"', "path.pattern is 'zigzag'; it must be one of meridians, spiral"),
+        ('"meridians"', '"zigzag"', "path.pattern is 'zigzag'; it must be one of adaptive, meridians, spiral"),
         ('"sphere"', '"egg"', "workpiece.class is 'egg'; it must be one of block, cylinder, mould, sphere"),
         ("[0, 0, 60, 0, 0, 0]", "[0, 0, 60]", "cell.workpiece_on_table is [0, 0, 60]; it must be a list of 6"),
         (

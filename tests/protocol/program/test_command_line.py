@@ -6,6 +6,7 @@ import pytest
 
 from protocol.program import command_line
 from protocol.program.command_line import Parser, call_programs, program_name, report, report_error, short_name
+from protocol.program.verbose import PACKAGES
 
 
 @pytest.mark.parametrize(
@@ -102,13 +103,13 @@ def test_a_message_that_nobody_reads_leaves_the_program_running() -> None:
 def test_the_option_for_debug_messages_stands_before_or_after_a_command(
     words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    logger = logging.getLogger("protocol")
     parser = Parser(prog="python -m example")
     parser.add_subparsers(dest="command").add_parser("part").add_argument("file")
     try:
         options = parser.parse_args(words)
         logging.getLogger("protocol.dialogue").debug("sent %r", b"H\r")
     finally:
-        logger.handlers, logger.level = [], logging.NOTSET
+        for logger in map(logging.getLogger, PACKAGES):
+            logger.handlers, logger.level = [], logging.NOTSET
     assert vars(options) == {"command": "part", "file": "file"}
     assert capsys.readouterr().err.endswith(" s protocol.dialogue: sent b'H\\r'\n")

@@ -150,9 +150,12 @@ def test_gains_in_engineering_units_are_those_of_the_registers(seed: int) -> Non
     ("gains", "complaint"),
     [
         (GainsConfig(float("nan"), 0.01, 0.001), "gains: proportional_duty_s_deg is nan; it must be a finite number"),
-        (GainsConfig(-0.01, 0.01, 0.001), "gains: proportional_duty_s_deg is -0.01; it must be at least 0"),
-        (GainsConfig(0.01, 0.0, 0.001), "gains: integral_time_s is 0.0; it must be at least 1e-06"),
-        (GainsConfig(0.01, 0.01, -1.0), "gains: derivative_time_s is -1.0; it must be at least 0"),
+        (
+            GainsConfig(-0.01, 0.01, 0.001),
+            "proportional_duty_s_deg is -0.01; it must be a finite number at least 0",
+        ),
+        (GainsConfig(0.01, 0.0, 0.001), "integral_time_s is 0.0; it must be a finite number at least 1e-06"),
+        (GainsConfig(0.01, 0.01, -1.0), "derivative_time_s is -1.0; it must be a finite number at least 0"),
         (GainsConfig(0.0, 0.01, 0.0), "does not fit the firmware"),
     ],
 )
