@@ -275,7 +275,7 @@ def _visible(
     adapt: AdaptOptions,
     progress: ProgressOf,
 ) -> KnownPart | None:
-    """Return the policy that computed which places can be seen; None where that was not computed when the session ended.
+    """Return the policy that computed what can be seen; None where that was not computed when the session ended.
 
     After a session without the mesh, only the report asks for it: then the true part answers.
     """
