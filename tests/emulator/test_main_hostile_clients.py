@@ -133,7 +133,7 @@ def test_an_unread_client_blocks_neither_commands_nor_others(start_emulator: Sta
         port.timeout = 0.5
         port.read(1 << 20)  # The replies to the other are received here too, as long as there are any.
         wait_until(lambda: ask(port, b"H") == b"H 10.0\r")
-    assert "at once" in table.stderr
+    assert "at the same time" in table.stderr
     os.close(deaf)
 
 
