@@ -57,7 +57,7 @@ class Policy(Protocol):
     def solid(self) -> Obstacle:
         """Return what counts as solid where the workpiece is, at this moment: strips are planned around it.
 
-        Its pose is that of the workpiece on the table (`Cell.T_TW`), and it turns with the table.
+        It has the pose of the workpiece on the table (`Cell.T_TW`), and turns with the table.
         """
         ...
 

@@ -188,7 +188,7 @@ def _in_either(first: AdaptiveScanned, second: AdaptiveScanned, T_12: FloatArray
 
 
 def _write(file: Path, name: str, *clouds: tuple[FloatArray, FloatArray]) -> None:
-    """Write clouds into one file; the profile's number is that of the placement."""
+    """Write clouds into one file; the profile's number is the number of the placement."""
     with PlyWriter(file, f"seventh-axis scan {name}, two placements joined; profile: the placement") as ply:
         for number, (points, beams) in enumerate(clouds):
             ply.write(points, beams, np.full(len(points), number))

@@ -54,7 +54,7 @@ def placement(*x_y_z_yaw_pitch_roll: float) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """Arm, table and probe with their placements. The defaults are estimates of a cell like that of the paper.
+    """Arm, table and probe with their placements. The defaults are estimates of a cell like the paper's.
 
     Attributes:
         arm: the arm; B has its origin at the foot of the arm.

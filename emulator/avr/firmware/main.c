@@ -29,7 +29,7 @@ ISR(TIMER2_COMPA_vect)
         ++overruns;
         return;
     }
-    board_drive(controller.pid.duty); /* that of the last tick, so that it changes at the same instant of each tick */
+    board_drive(controller.pid.duty); /* the duty of the last tick: it changes at the same instant of each tick */
     const int32_t count = encoder_sample();
     line_release();
     is_running = true;

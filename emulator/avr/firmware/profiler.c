@@ -59,7 +59,7 @@ static uint32_t fastest_that_can_brake(uint32_t low, uint32_t high, uint32_t acc
     return (climb(2 * low + acceleration, high - low, room - taken) - acceleration) >> 1;
 }
 
-/* Return the way until the next tick towards a target ahead, and change the speed to that of the next tick.
+/* Return the way until the next tick towards a target ahead, and set the speed of the next tick.
 
    From the next speed v' the table brakes at a over v'^2 / 2a. It stops in time when
    (v + v') / 2 + v'^2 / 2a <= distance, that is v'^2 + a (v + v') <= 2 a distance. */
